@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t most_live = 20000;     ///< grains that a browser turns smoothly
+constexpr std::size_t most_live = 20000;     ///< spheres that a browser turns smoothly
 constexpr std::size_t most_drawn = 1000000;  ///< that a report draws by itself
 
 /// The newest frame; none where there is none, or it lacks what a view needs.
@@ -78,8 +78,8 @@ Colouring colouring(const Frame& frame, io::GrainColour colour, const std::vecto
 
 /// What the script reads. Lengths are over the longest edge of the box; places from its lower corner, for
 /// lines of walls from its middle.
-json live_data(const Frame& frame, const std::vector<std::vector<Triangle>>& walls,
-               const std::vector<std::string>& materials) {
+json live_data(const Frame& frame, const io::GrainShapes& shapes,
+               const std::vector<std::vector<Triangle>>& walls, const std::vector<std::string>& materials) {
   const Bounds box = io::view_bounds(frame, walls);
   const Vec3 size = box.high - box.low;
   const double longest = size.maxCoeff();
@@ -94,10 +94,10 @@ json live_data(const Frame& frame, const std::vector<std::vector<Triangle>>& wal
     bytes.push_back(static_cast<std::uint8_t>(number & 0xff));
     bytes.push_back(static_cast<std::uint8_t>(number >> 8));
   };
-  for (std::size_t k = 0; k < frame.id.size(); ++k) {
-    for (int axis = 0; axis < 3; ++axis) put((frame.x[k][axis] - box.low[axis]) / longest);
-    put(frame.radius[k] / longest);
-    for (const Colouring& colour : colours) bytes.push_back(colour.values[k]);
+  for (const auto& [centre, radius, grain] : io::seen_balls(frame, shapes)) {
+    for (int axis = 0; axis < 3; ++axis) put((centre[axis] - box.low[axis]) / longest);
+    put(radius / longest);
+    for (const Colouring& colour : colours) bytes.push_back(colour.values[grain]);
   }
   const Vec3 middle = (box.low + box.high) / 2;
   json lines = json::array(), words = json::array();
@@ -136,16 +136,23 @@ HtmlSections view_section(const RunFolder& run) {
   if (!frame || frame->id.empty()) return {};
   std::vector<Wall> walls;
   std::vector<std::string> materials;
-  if (run.scene) walls = run.scene->setup.walls, materials = run.scene->setup.material_names;
-  const bool live = frame->id.size() <= most_live;
+  io::GrainShapes shapes;
+  if (run.scene) {
+    const Setup& setup = run.scene->setup;
+    walls = setup.walls, materials = setup.material_names;
+    shapes = io::grain_shapes(setup.clumps, !setup.inserts.empty(), run.directory / "results.h5");
+  }
+  const std::size_t balls = shapes.clump ? shapes.clump->balls.size() : 1;
+  const bool live = frame->id.size() * balls <= most_live;
   io::HtmlSection section{
       "The sample", fmt::format("The newest of its frames, at {}.{}", io::detail::with_unit(frame->time, "s"),
                                 live ? " Drag, or use the arrow keys, to turn it." : "")};
-  io::HtmlFigure figure{
-      .svg = io::draw_view(*frame, walls, {}, materials), .caption = "", .keeps_colours = true};
+  io::HtmlFigure figure{.svg = io::draw_view(*frame, walls, {.shapes = shapes}, materials),
+                        .caption = "",
+                        .keeps_colours = true};
   if (live)
-    figure.live = live_view(
-        live_data(*frame, io::wall_triangles(walls, frame->walls, io::grain_bounds(*frame)), materials));
+    figure.live = live_view(live_data(
+        *frame, shapes, io::wall_triangles(walls, frame->walls, io::grain_bounds(*frame)), materials));
   section.figures.push_back(std::move(figure));
   return {section};
 }

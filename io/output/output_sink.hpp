@@ -46,6 +46,8 @@ struct OutputContext {
   bool periodic = false;                          ///< the sample stands in a periodic cell
   std::vector<std::string> material_names = {};   ///< of the setup
   GrainLoad load = {};                            ///< of the scene
+  std::vector<Clump> clumps = {};                 ///< of the setup
+  bool inserts = false;                           ///< grains come while the run goes on
   std::vector<std::string> grids = {};            ///< names of the fields of the setup
   std::map<std::string, int> axis_of_stage = {};  ///< 0, 1, 2: along which the strain of a stage is measured
   Provenance provenance = {};

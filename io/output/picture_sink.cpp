@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "io/files/output_directory.hpp"
@@ -44,12 +45,16 @@ class PictureSink : public OutputSink {
     });
   }
 
-  void draw_grain_pictures(const SlabFrame& slab) const {
+  void draw_grain_pictures(const SlabFrame& slab) {
     const auto& [all, sample] = slab;
+    // The frame is in results.h5 already: that sink comes first.
+    if (!shapes_)
+      shapes_ = grain_shapes(context_.clumps, context_.inserts, context_.directory / "results.h5");
     if (all.with_contacts)
-      write_whole(context_.directory / "forces.svg",
-                  draw_forces(all, context_.walls, {.load = context_.load, .sample = sample}));
-    const GrainPicture picture{.walls = context_.walls, .sample = sample};
+      write_whole(
+          context_.directory / "forces.svg",
+          draw_forces(all, context_.walls, {.load = context_.load, .sample = sample, .shapes = *shapes_}));
+    const GrainPicture picture{.walls = context_.walls, .sample = sample, .shapes = *shapes_};
     write_whole(context_.directory / "velocities.svg", draw_velocities(all, picture));
     if (!all.material.empty())
       write_whole(context_.directory / "materials.svg",
@@ -69,6 +74,7 @@ class PictureSink : public OutputSink {
 
   OutputContext context_;
   ThinnedCurve curve_;
+  std::optional<GrainShapes> shapes_;  ///< once a frame was drawn
 };
 
 }  // namespace

@@ -26,6 +26,8 @@ OutputContext output_context(const std::filesystem::path& directory, const Setup
       .directory = directory, .walls = setup.walls, .material_names = setup.material_names, .ranks = ranks};
   for (const FieldRule& field : setup.fields) context.grids.push_back(field.name);
   context.periodic = setup.domain.repeats;
+  context.clumps = setup.clumps;
+  context.inserts = !setup.inserts.empty();
   for (const Stage& stage : setup.stages) context.axis_of_stage.emplace(stage.name, stage.end.strain_axis);
   for (const Wall& wall : setup.walls)
     context.load.pressure = std::max(context.load.pressure, wall.load.pressure);

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "io/pictures/grain_balls.hpp"
 #include "io/results/grain_load.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "runtime/graph/communicator.hpp"
@@ -39,6 +40,7 @@ struct ForcePicture {
   double thickness = 0;                     ///< [m] of the slab; 0: four mean radii
   GrainLoad load = {};                      ///< forces far below it are drawn thin
   std::optional<SampleExtent> sample = {};  ///< that the frame has the slab of; none: it has all grains
+  GrainShapes shapes = {};                  ///< of the run; clumps are drawn as their balls
 };
 
 /// Grains whose centre lies in a slab about the middle of the sample, normal to y, seen along y, and the
@@ -61,6 +63,7 @@ struct GrainPicture {
   double thickness = 0;                     ///< [m] of the slab; 0: four mean radii
   std::span<const Wall> walls = {};         ///< those of the frame, drawn as those of ForcePicture
   std::optional<SampleExtent> sample = {};  ///< as in ForcePicture
+  GrainShapes shapes = {};                  ///< likewise
 };
 
 /// Grains of such a slab coloured by their speed, from 0 to the one that nineteen of twenty of them do not

@@ -143,10 +143,10 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
                          detail::with_unit(grain_force(options.load, slab.sample.mean_radius), "N")),
              {12, style::soft_ink});
   svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.7")", style::grain_edge));
-  for (const std::size_t k : slab.grains) {
-    svg.circle(view.x(frame.x[k].x()), view.y(frame.x[k].z()), frame.radius[k] * view.scale,
-               style::grain_fill);
-  }
+  std::vector<SeenBall> balls;
+  for (const std::size_t k : slab.grains) add_balls(frame, options.shapes, k, balls);
+  for (const SeenBall& ball : balls)
+    svg.circle(view.x(ball.centre.x()), view.y(ball.centre.z()), ball.radius * view.scale, style::grain_fill);
   svg.end_group();
   svg.begin_group(R"(stroke-linecap="round")");
   for (const Force& force : slab.forces) {

@@ -38,6 +38,7 @@ Frame bodies_of(const Frame& part, const Keep& keep) {
     kept.radius.push_back(part.radius[k]);
     kept.u.push_back(part.u[k]);
     if (!part.material.empty()) kept.material.push_back(part.material[k]);
+    if (!part.orientation.empty()) kept.orientation.push_back(part.orientation[k]);
   }
   return kept;
 }
@@ -102,6 +103,7 @@ SlabFrame gather_slab(const Frame& part, const graph::Communicator& ranks, doubl
   append_parts(own.radius, ranks, all.radius);
   append_parts(own.u, ranks, all.u);
   append_parts(own.material, ranks, all.material);
+  append_parts(own.orientation, ranks, all.orientation);
   Frame come;
   append_parts(own.contact_bodies, ranks, come.contact_bodies);
   append_parts(own.contact_point, ranks, come.contact_point);

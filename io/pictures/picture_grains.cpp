@@ -45,6 +45,7 @@ std::string_view speed_colour(double speed, double usual) {
 struct GrainPage {
   std::string title;
   std::span<const Wall> walls;
+  GrainShapes shapes;
   std::function<std::string_view(std::size_t)> colour;
   std::function<void(Svg&, const View&, std::size_t)> over;  ///< on a grain
   std::function<void(Svg&, double x, double y)> legend;
@@ -65,13 +66,16 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
                        slab.grains.size(), slab.sample.grains),
            {13, style::soft_ink});
   // The nearest to the eye on top; equal ones keep the order of the frame, for the same file each time.
-  std::vector<std::size_t> order = slab.grains;
-  std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::size_t k) { return frame.x[k].y(); });
+  std::vector<SeenBall> balls;
+  for (const std::size_t k : slab.grains) add_balls(frame, page.shapes, k, balls);
+  std::ranges::stable_sort(balls, std::ranges::greater{}, [](const SeenBall& b) { return b.centre.y(); });
   svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.4")", style::grain_edge));
-  for (const std::size_t k : order) {
-    svg.circle(view.x(frame.x[k].x()), view.y(frame.x[k].z()), frame.radius[k] * view.scale, page.colour(k));
-    if (page.over) page.over(svg, view, k);
+  for (const auto& [centre, radius, grain] : balls) {
+    svg.circle(view.x(centre.x()), view.y(centre.z()), radius * view.scale, page.colour(grain));
+    if (page.over && !page.shapes.clump) page.over(svg, view, grain);
   }
+  if (page.over && page.shapes.clump)  // balls of others would hide what is on a grain
+    for (const std::size_t k : slab.grains) page.over(svg, view, k);
   svg.end_group();
   detail::draw_walls(svg, view, cuts);
   detail::draw_cell(svg, view, frame.domain);
@@ -96,6 +100,7 @@ std::string draw_velocities(const Frame& frame, const GrainPicture& options) {
   GrainPage page;
   page.title = "Velocities";
   page.walls = options.walls;
+  page.shapes = options.shapes;
   page.colour = [&](std::size_t k) { return speed_colour(frame.u[k].norm(), usual); };
   page.over = [&](Svg& svg, const View& view, std::size_t k) { draw_arrow(svg, view, frame, k, usual); };
   page.legend = [&](Svg& svg, double x, double y) {
@@ -118,6 +123,7 @@ std::string draw_materials(const Frame& frame, std::span<const std::string> name
   GrainPage page;
   page.title = "Materials";
   page.walls = options.walls;
+  page.shapes = options.shapes;
   page.colour = [&](std::size_t k) { return detail::hue(material(k)); };
   page.legend = [&](Svg& svg, double x, double y) {
     std::vector<std::size_t> count(std::max<std::size_t>(names.size(), 1), 0);

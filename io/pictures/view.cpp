@@ -241,12 +241,12 @@ void draw_wall(Canvas& canvas, const Projection& view, const Wall& wall, const V
   for (const auto& [a, b] : edges_of(triangles)) canvas.line(view.of(a), view.of(b), edge_colour);
 }
 
-/// Grains in the order in which they hide one another: behind those that are drawn there is nothing to do.
-std::vector<std::size_t> nearest_first(const Frame& frame, const Vec3& viewer) {
-  std::vector<std::size_t> order(frame.id.size());
+/// Balls in the order in which they hide one another: behind those that are drawn there is nothing to do.
+std::vector<std::size_t> nearest_first(std::span<const SeenBall> balls, const Vec3& viewer) {
+  std::vector<std::size_t> order(balls.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::vector<double> depth(order.size());
-  for (const std::size_t k : order) depth[k] = frame.x[k].dot(viewer);
+  for (const std::size_t k : order) depth[k] = balls[k].centre.dot(viewer);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return depth[a] > depth[b]; });
   return order;
@@ -309,13 +309,14 @@ Image render_view(const Frame& frame, std::span<const Wall> walls,
   Canvas canvas(view);
   const std::vector<double> values = grain_values(frame, options.colour);
   const ColourRange range = options.range.value_or(colour_range(values, options.colour));
+  const std::vector<SeenBall> balls = seen_balls(frame, options.shapes);
   double radii = 0;
-  for (const std::size_t k : nearest_first(frame, view.axes.viewer)) {
-    radii += frame.radius[k];
-    canvas.sphere(view.of(frame.x[k]), frame.radius[k] * view.scale,
-                  colour_of(values[k], range, options.colour));
+  for (const std::size_t k : nearest_first(balls, view.axes.viewer)) {
+    const auto& [centre, radius, grain] = balls[k];
+    radii += radius;
+    canvas.sphere(view.of(centre), radius * view.scale, colour_of(values[grain], range, options.colour));
   }
-  if (!frame.id.empty()) canvas.darken_gaps(1.5 * radii / static_cast<double>(frame.id.size()) * view.scale);
+  if (!balls.empty()) canvas.darken_gaps(1.5 * radii / static_cast<double>(balls.size()) * view.scale);
   const Vec3 middle = (box.low + box.high) / 2;
   for (std::size_t w = 0; w < std::min(walls.size(), triangles.size()); ++w)
     draw_wall(canvas, view, walls[w], middle, triangles[w]);

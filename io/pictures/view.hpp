@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/files/png.hpp"
+#include "io/pictures/grain_balls.hpp"
 #include "io/results/cell_outline.hpp"
 #include "kernels/registry.hpp"
 #include "kernels/shapes/walls.hpp"
@@ -51,6 +52,7 @@ struct ViewOptions {
   GrainColour colour = GrainColour::speed;
   std::optional<ColourRange> range = {};  ///< none: that of the frame
   std::optional<Bounds> box = {};         ///< that fills the image; none: grains and walls of the frame
+  GrainShapes shapes = {};                ///< of the run
 };
 
 /// The brick of the frame's periodic cell; nothing between walls.
@@ -59,9 +61,9 @@ std::vector<CellLine> lines_of_cell(const Frame& frame);
 /// The box around grains, triangles and cell [m]; low > high where there is none.
 Bounds view_bounds(const Frame& frame, std::span<const std::vector<Triangle>> walls);
 
-/// Grains as shaded spheres; of the walls, `triangles` by wall (wall_triangles.hpp), those behind the grains
-/// as grey faces, and the edges of those before them; and the lines of a periodic cell. The image of nothing
-/// is white.
+/// Grains as shaded spheres, clumps as their balls; of the walls, `triangles` by wall (wall_triangles.hpp),
+/// those behind the grains as grey faces, and the edges of those before them; and the lines of a periodic
+/// cell. The image of nothing is white.
 Image render_view(const Frame& frame, std::span<const Wall> walls,
                   std::span<const std::vector<Triangle>> triangles, const ViewOptions& options);
 
