@@ -31,7 +31,11 @@ class Viewed {
  public:
   explicit Viewed(const ViewCommandOptions& options) : results_(fs::path(options.run) / "results.h5") {
     const RunFolder run = read_run_folder(options.run);
-    if (run.scene) walls_ = run.scene->setup.walls;
+    if (run.scene) {
+      const Setup& setup = run.scene->setup;
+      walls_ = setup.walls;
+      view_.shapes = io::grain_shapes(setup.clumps, !setup.inserts.empty(), results_);
+    }
     view_.colour = io::grain_colours().named(options.colour).kind;
     view_.camera = {options.azimuth, options.elevation};
     view_.width = static_cast<std::size_t>(options.width);
@@ -54,10 +58,10 @@ class Viewed {
                                    : io::FrameParts::places);
   }
 
-  /// One scale and one place for all frames.
+  /// One scale and one place for all frames. A frame at rest, or without forces, has no scale of its own.
   void fit() {
     Bounds box;
-    io::ColourRange range;
+    std::optional<io::ColourRange> range;
     bool first = true;
     for (std::size_t k = 0; k < frames_; ++k) {
       const Frame each = frame(k);
@@ -66,13 +70,14 @@ class Viewed {
       const Bounds of_frame = io::view_bounds(each, triangles(each));
       const io::ColourRange colours = io::colour_range(values, view_.colour);
       box = first ? of_frame : Bounds{box.low.cwiseMin(of_frame.low), box.high.cwiseMax(of_frame.high)};
-      range = first ? colours
-                    : io::ColourRange{std::min(range.low, colours.low), std::max(range.high, colours.high)};
       first = false;
+      if (std::ranges::max(values) <= 0) continue;
+      range = range ? io::ColourRange{std::min(range->low, colours.low), std::max(range->high, colours.high)}
+                    : colours;
     }
     if (first) return;
     view_.box = box;
-    view_.range = range;
+    view_.range = range.value_or(io::ColourRange{0, 1});
   }
 
   std::string image(std::size_t k) const {

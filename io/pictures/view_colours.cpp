@@ -107,7 +107,8 @@ ColourRange colour_range(std::span<const double> values, GrainColour colour) {
   if (values.empty()) return {0, 1};
   std::vector<double> sorted(values.begin(), values.end());
   std::ranges::sort(sorted);
-  const double usual = sorted[(sorted.size() - 1) * 49 / 50];
+  const double most = sorted[(sorted.size() - 1) * 49 / 50];
+  const double usual = most > 0 ? most : sorted.back();  // a few that move among grains at rest
   const ColourRange range =
       colour == GrainColour::radius ? ColourRange{sorted.front(), sorted.back()} : ColourRange{0, usual};
   return range.high > range.low ? range : ColourRange{range.low, range.low > 0 ? 2 * range.low : 1};

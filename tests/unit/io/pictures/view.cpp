@@ -98,6 +98,13 @@ TEST(View, ColoursAreBySpeedRadiusForceOrMaterial) {
   EXPECT_THROW(grain_colours().named("taste"), std::invalid_argument);
 }
 
+TEST(View, TheScaleOfAFewThatMoveAmongGrainsAtRestIsTheirs) {
+  std::vector<double> speeds(100, 0.0);
+  EXPECT_EQ(colour_range(speeds, GrainColour::speed).high, 1);
+  speeds[7] = 0.02;
+  EXPECT_EQ(colour_range(speeds, GrainColour::speed).high, 0.02);
+}
+
 std::uint32_t number_at(const std::string& bytes, std::size_t at) {
   std::uint32_t number = 0;
   for (std::size_t k = 0; k < 4; ++k) number = number << 8 | static_cast<unsigned char>(bytes[at + k]);
