@@ -37,7 +37,7 @@ int new_command(const NewOptions& options) {
         "# docs/scenes.md has every key; `talus scene-reference` prints it.\n\nname = \"{0}\"\n{2}",
         name, kind.sentence, kind.text);
     io::parse_scene(text, path.string());  // refuses a name that no scene may have
-    io::check_output_files({}, {path}, false);
+    io::check_output_files({}, {path}, options.force);
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

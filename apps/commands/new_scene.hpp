@@ -16,9 +16,10 @@ const std::vector<SceneKind>& scene_kinds();
 struct NewOptions {
   std::string name;  ///< of the scene; NAME.toml is written
   std::string kind;  ///< of scene_kinds()
+  bool force = false;
 };
 
-/// Writes NAME.toml; a file that is there is never replaced. Returns an ExitCode.
+/// Writes NAME.toml; a file that is there is replaced only with `force`. Returns an ExitCode.
 int new_command(const NewOptions& options);
 
 }  // namespace talus

@@ -27,11 +27,13 @@ TEST_P(NewScene, IsSoundAndRuns) {
 INSTANTIATE_TEST_SUITE_P(Kinds, NewScene, testing::Values("triaxial", "silo", "drum", "heap", "periodic"),
                          [](const auto& kind) { return std::string(kind.param); });
 
-TEST(NewCommand, ReplacesNothingAndRefusesWhatNoSceneCanBe) {
+TEST(NewCommand, ReplacesNothingUnaskedAndRefusesWhatNoSceneCanBe) {
   const ScratchDirectory scratch;
   write(scratch / "mine.toml", "mine");
   EXPECT_EQ(run(scratch.path(), "new mine --kind silo").code, 2);
   EXPECT_EQ(content(scratch / "mine.toml"), "mine");
+  EXPECT_EQ(run(scratch.path(), "new mine --kind silo --force").code, 0) << "as the refusal says";
+  EXPECT_NE(content(scratch / "mine.toml"), "mine");
   const Outcome unknown = run(scratch.path(), "new other --kind volcano");
   EXPECT_EQ(unknown.code, 2);
   EXPECT_NE(unknown.messages.find("triaxial, silo, drum, heap, periodic"), std::string::npos)

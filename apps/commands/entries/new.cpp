@@ -13,6 +13,7 @@ void add_options(CLI::App& app, NewOptions& options) {
   for (const SceneKind& kind : scene_kinds())
     kinds += (kinds.empty() ? "" : "; ") + std::string(kind.name) + ": " + std::string(kind.sentence);
   app.add_option("--kind", options.kind, kinds)->type_name("KIND")->required();
+  app.add_flag("--force", options.force, "replace the file where it is there");
 }
 
 int run(NewOptions& options, CommandLine) {
