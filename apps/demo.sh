@@ -16,7 +16,7 @@ if [[ " $* " != *" --dry-run "* ]] && { [ "$status" -eq 0 ] || [ "$status" -eq 3
   echo
   echo "Results in $PWD/out/demo:"
   find out/demo -maxdepth 1 -type f | sort | sed 's/^/  /'
-  echo "  out/demo/report.html shows all of it in a browser: what was simulated, whether to believe it, curves, pictures"
   echo "  out/demo/fields.pvd opens in ParaView. What is in each file: docs/formats.md; what it shows: docs/tutorial.md"
+  echo "All of it on one page, for a browser: $PWD/out/demo/report.html"
 fi
 exit "$status"

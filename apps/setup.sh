@@ -1,6 +1,6 @@
 # Sourced by apps/demo.sh and tests/run.sh, so that both work from one package list: installs what is missing of
 # apps/packages.txt and sets what Open MPI needs to run as root. Touches no package and no network when nothing is missing.
-# `source apps/setup.sh tests` asks for what is marked '?' too, and goes on without it.
+# `source apps/setup.sh tests` asks for what is marked '+' and '?' too, and goes on without the latter.
 
 talus_install_missing() {
   local list="$1" for_tests="$2" package missing=() wished=()
@@ -9,9 +9,10 @@ talus_install_missing() {
     return 0
   fi
   for package in $(sed 's/#.*//' "$list"); do
-    [ "$(dpkg-query -W -f='${db:Status-Status}' "${package#\?}" 2>/dev/null)" = installed ] && continue
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "${package#[?+]}" 2>/dev/null)" = installed ] && continue
     case "$package" in
       \?*) [ "$for_tests" != tests ] || wished+=("${package#\?}") ;;
+      +*) [ "$for_tests" != tests ] || missing+=("${package#+}") ;;
       *) missing+=("$package") ;;
     esac
   done
