@@ -1,9 +1,20 @@
-# A recipe for Spack (0.20 and newer). It is built from a checkout:
+# A recipe for Spack 1.0 and newer. It is built from a checkout:
 #
-#     spack repo create talus-recipes && mkdir -p talus-recipes/packages/talus
-#     cp apps/packages/spack/package.py talus-recipes/packages/talus/ && spack repo add talus-recipes
+#     spack repo create talus-recipes talus_recipes
+#     mkdir -p talus-recipes/spack_repo/talus_recipes/packages/talus
+#     cp apps/packages/spack/package.py talus-recipes/spack_repo/talus_recipes/packages/talus/
+#     spack repo add talus-recipes/spack_repo/talus_recipes
 #     spack dev-build --source-path . talus@main
+#
+# Spack 0.23 has the folder talus-recipes/packages/talus instead, and adds talus-recipes.
+import os
+
 from spack.package import *
+
+try:
+    from spack_repo.builtin.build_systems.cmake import CMakePackage, generator
+except ImportError:  # before 1.0 spack.package has both
+    pass
 
 
 class Talus(CMakePackage):
@@ -18,7 +29,6 @@ class Talus(CMakePackage):
     depends_on("c", type="build")
     depends_on("cxx", type="build")
     depends_on("cmake@3.25:", type="build")
-    depends_on("ninja", type="build")
     depends_on("mpi")
     depends_on("hdf5@1.10: +mpi")
     depends_on("eigen@3.4:")
@@ -33,6 +43,7 @@ class Talus(CMakePackage):
     depends_on("py-h5py", type="run", when="+python")
     depends_on("py-numpy", type="run", when="+python")
     depends_on("py-matplotlib", type="run", when="+python")
+    depends_on("py-tomli-w", type="run", when="+python")
 
     conflicts("%gcc@:11", msg="C++20 as Talus uses it begins with gcc 12")
 
@@ -41,9 +52,13 @@ class Talus(CMakePackage):
     def cmake_args(self):
         return [self.define("TALUS_TESTS", False)]
 
+    def setup_run_environment(self, env):
+        if self.spec.satisfies("+python"):
+            env.prepend_path("PYTHONPATH", join_path(self.prefix.lib, "python3", "dist-packages"))
+
     @run_after("install")
     @on_package_attributes(run_tests=True)
     def smoke(self):
         script = join_path(self.prefix.share, "talus", "smoke.sh")
-        with set_env(PATH=self.prefix.bin + ":" + env["PATH"]):
-            which("bash")(script)
+        path = os.pathsep.join([self.prefix.bin, os.environ["PATH"]])
+        which("bash")(script, extra_env={"PATH": path})
