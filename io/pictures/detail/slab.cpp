@@ -59,9 +59,10 @@ View view_of(const Frame& frame, const Slab& slab, std::span<const Cut> walls, c
   if (domain.cell.zz > 0) z_low = std::min(z_low, domain.low.z()), z_high = std::max(z_high, far.z());
   if (!(x_low < x_high)) x_low = 0, x_high = 1;
   if (!(z_low < z_high)) z_low = 0, z_high = 1;
-  const double x_reach = 0.5 * (x_high - x_low), z_reach = 0.5 * (z_high - z_low);
-  const double x_least = x_low - x_reach, x_most = x_high + x_reach, z_least = z_low - z_reach,
-               z_most = z_high + z_reach;
+  // Of the longer side: a drum that is half full is seen whole.
+  const double reach = 0.5 * std::max(x_high - x_low, z_high - z_low);
+  const double x_least = x_low - reach, x_most = x_high + reach, z_least = z_low - reach,
+               z_most = z_high + reach;
   for (const Cut& wall : walls)
     for (const auto& [x, z] : {std::pair{wall.x1, wall.z1}, std::pair{wall.x2, wall.z2}}) {
       x_low = std::min(x_low, std::max(x, x_least)), x_high = std::max(x_high, std::min(x, x_most));

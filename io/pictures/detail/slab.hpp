@@ -54,7 +54,7 @@ struct Placement {
 };
 
 /// The grains of the slab, the walls and the periodic cell about them, and a border of a mean radius. Walls
-/// that go on beyond half the grains' extent are cut off.
+/// are cut off that go on beyond half the longer side of the grains.
 View view_of(const Frame& frame, const Slab& slab, std::span<const Cut> walls, const Placement& at);
 
 /// Walls within the view.

@@ -5,6 +5,7 @@
 #include <array>
 #include <string>
 
+#include "io/pictures/detail/slab.hpp"
 #include "io/pictures/picture.hpp"
 
 namespace talus::io::grain_picture_test {
@@ -45,6 +46,20 @@ TEST(GrainPictures, TheLegendOfMaterialsCountsTheGrainsThatAreSeen) {
   EXPECT_NE(svg.find("glass (20)"), std::string::npos);
   EXPECT_NE(svg.find("steel (9)"), std::string::npos);
   EXPECT_EQ(svg.find("none ("), std::string::npos);
+}
+
+TEST(GrainPictures, AWallAboveAWideBedIsSeenAsFarAsHalfItsWidth) {
+  // Grains from x = -0.01 to 2.01, 0.02 high; the wall at x = 0 goes on up to 0.9.
+  Frame frame;
+  for (int k = 0; k < 21; ++k) {
+    frame.id.push_back(k);
+    frame.x.push_back({0.1 * k, 0, 0});
+    frame.radius.push_back(0.01);
+  }
+  const detail::Slab slab = detail::cut_slab(frame, 1);
+  const std::vector<detail::Cut> low{{0, 0, 0, 0.9}}, high{{0, 0, 0, 9}};
+  EXPECT_GT(detail::view_of(frame, slab, low, {100, 0, 0}).z_high, 0.9);
+  EXPECT_NEAR(detail::view_of(frame, slab, high, {100, 0, 0}).z_high, 0.01 + 1.01 + 0.01, 1e-12);
 }
 
 TEST(GrainPictures, OfNothingAndOfGrainsAtRestArePictures) {
