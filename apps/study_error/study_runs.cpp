@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "apps/shared/median.hpp"
 #include "runtime/step/decomposition.hpp"
@@ -24,6 +25,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 struct Outcome {
   Curve stress;         ///< time [s], q/p; empty when the walls close no box
   std::vector<Vec3> x;  ///< in order of id
+  Domain domain;        ///< where they stand
   double time = 0, seconds = 0, last_step = 0;
   std::int64_t steps = 0, sweeps = 0, missed = 0;
 };
@@ -55,7 +57,9 @@ Outcome run_once(const StudySample& sample, const StudyPlan& plan, const StudyVa
     if (const auto triaxial = simulation.triaxial()) out.stress.push_back({report.time, triaxial->q_over_p});
     simulation.begin_next_stage();
   }
-  out.x = simulation.frame(false).x;
+  Frame last = simulation.frame(false);
+  out.x = std::move(last.x);
+  out.domain = last.domain;
   return out;
 }
 
@@ -82,14 +86,20 @@ double position_error(const Outcome& run, const Outcome& reference, const Bodies
   if (std::abs(run.time - reference.time) > 0.51 * std::max(run.last_step, reference.last_step) ||
       bodies.size() == 0)
     return nan;
-  double sum = 0, diameter = 0;
-  const auto count = static_cast<double>(bodies.size());
-  for (std::size_t k = 0; k < run.x.size(); ++k) sum += (run.x[k] - reference.x[k]).squaredNorm() / count;
-  for (double radius : bodies.radius) diameter += 2 * radius / count;
-  return std::sqrt(sum) / diameter;
+  double diameter = 0;
+  for (double radius : bodies.radius) diameter += 2 * radius / static_cast<double>(bodies.size());
+  return rms_distance(run.x, reference.x, reference.domain) / diameter;
 }
 
 }  // namespace
+
+double rms_distance(std::span<const Vec3> x, std::span<const Vec3> reference, const Domain& domain) {
+  double sum = 0;
+  const auto count = static_cast<double>(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k)
+    sum += domain.separation(x[k], reference[k]).squaredNorm() / count;
+  return std::sqrt(sum);
+}
 
 std::string why_no_step(const io::Scene& scene, const StudyPlan& plan, double time_step) {
   const std::vector<Stage>& stages = scene.setup.stages;

@@ -3,10 +3,12 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "apps/study_error/study_variants.hpp"
+#include "kernels/detection/domain.hpp"
 
 namespace talus {
 
@@ -19,7 +21,7 @@ struct RunRow {
   double seconds = 0;  ///< elapsed time of all steps, median of the repetitions [s]
   double stress_error =
       0;  ///< rms over the steps of q/p less the reference's; NaN when the walls close no box
-  double position_error = 0;  ///< rms over the grains of |x - x_ref| at the end, over the mean diameter; NaN
+  double position_error = 0;  ///< rms_distance from the reference at the end, over the mean diameter; NaN
                               ///< when the run ended at another time
 };
 
@@ -45,6 +47,10 @@ struct RunStudy {
 void study_runs(const StudySample& sample, const StudyPlan& plan,
                 const std::function<void(const std::string&)>& say, const std::function<void()>& keep,
                 RunStudy& study);
+
+/// Root mean square of the distances of points from those of the reference, the shortest way in the domain,
+/// as one run may have wrapped a point into the periodic cell on another side than the other run [m].
+double rms_distance(std::span<const Vec3> x, std::span<const Vec3> reference, const Domain& domain);
 
 /// Why runs of the scene with that factor of the time step would make no step, or a stage of them none: key
 /// and remedy; "" when they make some.
