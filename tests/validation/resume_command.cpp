@@ -1,4 +1,5 @@
-/// Stopping a run and going on with it, from outside: signals, limits, `talus status`, and what is refused.
+/// Stopping a run and going on with it, from outside: signals, limits and `talus status`. What is refused:
+/// resume_refusals.cpp.
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -156,107 +157,6 @@ TEST_F(Resume, IsTheSameLineUntilItIsDone) {
             "stage.shear.end.steps was 400 and is 410");
 }
 
-TEST_F(Resume, IsRefusedForAnotherScene) {
-  ASSERT_EQ(run("run scene.toml --out parts --resume --steps 3 --threads 1").code, 0);
-  const auto before = files_below(at("parts"));
-  const Outcome other =
-      run("run scene.toml --out parts --resume --set stage.shear.friction=0.5 --set solver.tolerance=0.5");
-  EXPECT_EQ(other.code, 2);
-  EXPECT_NE(other.messages.find("stage.shear.friction was 0.35 and is 0.5"), std::string::npos)
-      << other.messages;
-  EXPECT_NE(other.messages.find("solver.tolerance was 0.01 and is 0.5"), std::string::npos) << other.messages;
-  EXPECT_EQ(files_below(at("parts")), before) << "nothing was written";
-  const Outcome loads =
-      run("run scene.toml --out parts --resume --threads 1 --set wall.z+.pressure=2e4 "
-          "--set output.xyz=true --set stage.shear.end.steps=3");
-  EXPECT_EQ(loads.code, 0) << loads.messages;
-  EXPECT_EQ(run("run scene.toml --out parts --resume --force").code, 2);
-}
-
-/// A short run takes no checkpoint by itself, so that its results are all that tells of its scene.
-TEST_F(Resume, OfADoneRunWithoutCheckpointIsRefusedForAnotherScene) {
-  ASSERT_EQ(run("run scene.toml --out out --threads 1").code, 0);
-  ASSERT_EQ(checkpoints("out"), 0U);
-  const auto before = files_below(at("out"));
-  for (const char* change : {"wall.x+.position=0.2", "seed=2", "stage.shear.end.steps=9"}) {
-    const Outcome other = run(std::string("run scene.toml --out out --threads 1 --resume --set ") + change);
-    EXPECT_EQ(other.code, 2) << change << other.messages;
-    const std::string key = std::string(change).substr(0, std::string(change).find('='));
-    EXPECT_NE(other.messages.find(key + " was "), std::string::npos) << other.messages;
-  }
-  const Outcome same = run("run scene.toml --out out --threads 1 --resume");
-  EXPECT_EQ(same.code, 0) << same.messages;
-  EXPECT_NE(same.messages.find("is done"), std::string::npos) << same.messages;
-  EXPECT_EQ(files_below(at("out")), before);
-}
-
-TEST_F(Resume, OfADoneRunWithoutCheckpointIsRefusedForAnotherInputFile) {
-  const std::string kind = "[sample]\nkind = \"bodies\"\nfile = \"grains.csv\"\n";
-  const std::string scene =
-      "time_step = 1e-4\n[material]\ndensity = 2600\n" + kind + "[[stage]]\nname = \"fall\"\n" +
-      "gravity = [0, 0, -9.81]\nfriction = 0\nend = { steps = 3 }\n[output]\npictures = false\n";
-  write(at("fall.toml"), scene);
-  write(at("grains.csv"), "id,x,y,z,radius\n1,0,0,0,0.01\n");
-  const std::string line = "run fall.toml --out out --threads 1 --resume";
-  ASSERT_EQ(run("run fall.toml --out out --threads 1").code, 0);
-  ASSERT_EQ(checkpoints("out"), 0U);
-  const auto before = files_below(at("out"));
-  EXPECT_EQ(run(line).code, 0);
-  write(at("grains.csv"), "id,x,y,z,radius\n1,0,0,1,0.01\n");
-  const Outcome other = run(line);
-  EXPECT_EQ(other.code, 2) << other.messages;
-  EXPECT_NE(other.messages.find("grains.csv has changed"), std::string::npos) << other.messages;
-  EXPECT_EQ(files_below(at("out")), before);
-}
-
-/// It was killed before its first checkpoint: the same scene begins anew there, another one does not.
-TEST_F(Resume, OfAStoppedRunWithoutCheckpointIsRefusedForAnotherScene) {
-  ASSERT_EQ(run("run scene.toml --out out --threads 1 --steps 2").code, 0);
-  const auto before = files_below(at("out"));
-  const Outcome other = run("run scene.toml --out out --threads 1 --resume --set stage.shear.friction=0.5");
-  EXPECT_EQ(other.code, 2) << other.messages;
-  EXPECT_NE(other.messages.find("stage.shear.friction was 0.35 and is 0.5"), std::string::npos)
-      << other.messages;
-  EXPECT_EQ(files_below(at("out")), before);
-  EXPECT_EQ(run("run scene.toml --out out --threads 1 --resume --set output.xyz=true").code, 0);
-}
-
-TEST_F(Resume, DoesNotReplaceResultsOfWhichNobodyKnowsTheScene) {
-  fs::create_directory(at("out"));
-  write(at("out/steps.csv"), "of another program\n");
-  const Outcome refused = run("run scene.toml --out out --threads 1 --resume");
-  EXPECT_EQ(refused.code, 2) << refused.messages;
-  EXPECT_NE(refused.messages.find("steps.csv"), std::string::npos) << refused.messages;
-  EXPECT_EQ(content(at("out/steps.csv")), "of another program\n");
-  EXPECT_EQ(files_below(at("out")).size(), 1U) << "nothing was written";
-  EXPECT_EQ(run("run scene.toml --out out --threads 1 --force").code, 0);
-}
-
-/// The end of a run that goes on is that of one that was never stopped: not with the lines of others in it.
-TEST_F(Resume, DoesNotGoOnInFilesThatAreNotItsOwn) {
-  const std::string line = "run scene.toml --out parts --threads 1 --resume";
-  ASSERT_EQ(run(line + " --steps 3").code, 0);
-  const std::string steps = content(at("parts/steps.csv"));
-  const std::string last_line = steps.substr(steps.rfind('\n', steps.size() - 2) + 1);
-  for (const std::string& changed :
-       {replaced(steps, "\n1,", "\n7,"), steps.substr(0, steps.size() - last_line.size()), last_line}) {
-    write(at("parts/steps.csv"), changed);
-    const auto before = files_below(at("parts"));
-    const Outcome refused = run(line);
-    EXPECT_EQ(refused.code, 2) << refused.messages;
-    EXPECT_NE(refused.messages.find("steps.csv"), std::string::npos) << refused.messages;
-    EXPECT_EQ(files_below(at("parts")), before);
-  }
-  fs::remove(at("parts/steps.csv"));
-  EXPECT_EQ(run(line).code, 2) << "it is gone";
-  EXPECT_FALSE(fs::exists(at("parts/steps.csv")));
-  // What follows the checkpoint is cut off, whatever it is.
-  write(at("parts/steps.csv"), steps + last_line + "half a li");
-  EXPECT_EQ(run(line).code, 0);
-  ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
-  EXPECT_EQ(content(at("parts/walls.csv")), content(at("straight/walls.csv")));
-}
-
 TEST_F(Resume, LeavesADoneRunAloneWhateverBecameOfItsTables) {
   const std::string line = "run scene.toml --out out --threads 1 --resume";
   ASSERT_EQ(run(line).code, 0);
@@ -267,31 +167,6 @@ TEST_F(Resume, LeavesADoneRunAloneWhateverBecameOfItsTables) {
   EXPECT_EQ(again.code, 0) << again.messages;
   EXPECT_NE(again.messages.find("is done"), std::string::npos) << again.messages;
   EXPECT_EQ(files_below(at("out")), before);
-}
-
-TEST_F(Resume, WithoutACheckpointIsRefusedWhereNothingCanBeReadOfTheRun) {
-  for (const auto& [name, content] :
-       {std::pair{"run.json", "null"}, {"scene.resolved.toml", "box = "}, {"scene.resolved.toml", ""}}) {
-    ASSERT_EQ(run("run scene.toml --out out --threads 1 --steps 2 --force").code, 0);
-    write(at("out") / name, content);
-    const auto before = files_below(at("out"));
-    const Outcome refused = run("run scene.toml --out out --threads 1 --resume");
-    EXPECT_EQ(refused.code, 2) << name << refused.messages;
-    EXPECT_NE(refused.messages.find(name), std::string::npos) << refused.messages;
-    EXPECT_EQ(files_below(at("out")), before);
-  }
-}
-
-TEST_F(Resume, IsRefusedForAnotherOrderOfStages) {
-  ASSERT_EQ(run("run scene.toml --out out --threads 1 --resume --steps 3").code, 0);
-  const std::string press = "[[stage]]\nname = \"press\"\nfriction = 0\nend = { steps = 6 }\n";
-  write(at("scene.toml"), replaced(pressed_box, press, "") + "\n" + press);
-  const Outcome other = run("run scene.toml --out out --threads 1 --resume");
-  EXPECT_EQ(other.code, 2);
-  EXPECT_NE(other.messages.find("order of stage was press, shear and is shear, press"), std::string::npos)
-      << other.messages;
-  write(at("scene.toml"), pressed_box);
-  EXPECT_EQ(run("run scene.toml --out out --threads 1 --resume").code, 0);
 }
 
 TEST_F(Resume, GoesBackToTheCheckpointBeforeADamagedOne) {

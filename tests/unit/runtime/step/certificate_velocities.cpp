@@ -50,21 +50,26 @@ TEST(Certificate, ComparesTheWorkOfErrorsWithAllThatLargeClustersExchange) {
   EXPECT_EQ(doubted({.wall_inv_masses = {0}, .drive = 3}, {5}), solved) << "grains that follow a driven wall";
   EXPECT_EQ(doubted({.wall_inv_masses = {0}, .drive = 1}, {5}), go_on);
   EXPECT_EQ(doubted({.wall_inv_masses = {0}}, {300}), solved) << "a hundredth of what presses: 3 m/s";
-  EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}, {.energy = 0.9, .mass = 0.5}), go_on)
-      << "what small clusters exchange is none of it";
+  EXPECT_EQ(doubted({.rounding_velocity = 3e-3}, {}), solved) << "rounding, at a tolerance of 1e-3: 3 m/s";
+  EXPECT_EQ(doubted({.rounding_velocity = 1e-3}, {}), go_on);
+  for (const Exchanged small : {Exchanged{.energy = 0.9}, Exchanged{.mass = 0.5}})
+    EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}, small), go_on)
+        << "neither what small clusters exchange nor their share of walls is of it";
 }
 
 // A work that is nothing to all may be much to one.
 TEST(Certificate, BelievesTheWorstOfSeveralLargeClusters) {
   SolverSettings settings{.balance_tolerance = 0.05};
   Certificate certificate(settings);
-  certificate.begin({.wall_pushes = {0}});
+  certificate.begin({.rounding_velocity = 2e-6, .wall_pushes = {0}});
   KnownProblem problem(1, {0.5});
   problem.largest_work = 0.02;
   certificate.judge(sums_of({0, 1}, 1000), {.iterations = 0}, problem);
   const Found nearly_right{10, 1e-4, 1, 1e-9};
   EXPECT_EQ(certificate.judge(sums_of(nearly_right, 1000), {.iterations = 10}, problem), Verdict::go_on);
   EXPECT_NEAR(certificate.result().velocity_error, 0.5, 1e-12) << "what a check finds for it";
+  EXPECT_NEAR(problem.floors.speed, 2e-3, 1e-15) << "rounding over the tolerance";
+  EXPECT_EQ(problem.floors.interest, CertificateThresholds{}.interest);
   problem.largest_work.reset();
   EXPECT_EQ(certificate.judge(sums_of(nearly_right, 1000), {.iterations = 20}, problem), Verdict::solved);
 }

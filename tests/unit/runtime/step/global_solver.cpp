@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "runtime/graph/executor.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/simulation.hpp"
@@ -48,6 +50,35 @@ TEST(GlobalSolver, MeasuresWhatSmallClustersDoToAWallByAllThatItCarries) {
   EXPECT_NEAR(solver.small_error(1e-6, 0, 1).relative, 0.5, 1e-3);
   state.wall_states[0].impulse = Vec3(0, 0, 1e4 * weight);
   EXPECT_LT(solver.small_error(1e-6, 0, 1).relative, 0.02);
+}
+
+/// Two grains on a floor, far from one another; what carries one of them is halved.
+TEST(GlobalSolver, ComparesTheWorkInSeveralClustersWithAllFloors) {
+  constexpr double r = 0.01, h = 1e-3;
+  talus::Setup setup = simulation_test::falling(1);
+  setup.walls.resize(1);
+  setup.solver.tolerance = 1e-9;
+  Bodies bodies;
+  for (const int k : {0, 1}) add_sphere(bodies, BodyId{k}, Vec3(10 * k * r, 0, r), r, 2600);
+  const double mass = bodies.mass(0), weight = mass * 10 * h;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, std::move(bodies), executor);
+  simulation.step();
+  StepState state = simulation.state();
+  const auto touches = std::ranges::find_if(state.contacts.rn, [](double rn) { return rn > 0; });
+  ASSERT_NE(touches, state.contacts.rn.end());
+  *touches /= 2;
+  const graph::OneRank ranks;
+  const DecompositionSettings settings;
+  Gluing gluing(state, settings, ranks);
+  GlobalSolver solver(state, simulation.parameters(), settings, gluing, ranks);
+  solver.find_clusters({.bodies = 0, .smooth = 0, .loops = 0, .chained = 0}, false);
+  ASSERT_TRUE(solver.several_large_clusters());
+  // r_n e over m (v/2)^2/2, with v what gravity adds, r_n = m v/2 and e = v/2.
+  EXPECT_NEAR(solver.large_work(0, 0), 2, 1e-6);
+  const double work = mass * 0.01 * 0.01 / 4;
+  EXPECT_NEAR(solver.large_work(3, 0), work / (0.5 * mass * 9), 1e-6 * work / mass);
+  EXPECT_NEAR(solver.large_work(0, 100), work / (0.5 * 2500 * weight * weight / mass), 1e-9);
 }
 
 /// A block of 216 grains that touch along all axes: more bodies than are small with friction, fewer than are

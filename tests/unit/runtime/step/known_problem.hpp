@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/clusters/cluster_work.hpp"
 #include "runtime/step/certificate.hpp"
 
 namespace talus::certificate_test {
@@ -29,7 +30,10 @@ class KnownProblem : public WholeProblem {
   bool small_clusters() override { return !small_errors_.empty(); }
   bool large_clusters() override { return true; }
   bool several_large_clusters() override { return largest_work.has_value(); }
-  double large_work(double, double) override { return *largest_work; }
+  double large_work(double speed, double interest) override {
+    floors = {speed, interest};
+    return *largest_work;
+  }
   SmallError small_error(double enough, int) override {
     const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
     return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error), mends, jammed,
@@ -46,6 +50,7 @@ class KnownProblem : public WholeProblem {
   bool jammed = false, mends = false;  ///< what small clusters are besides
   Exchanged exchanged;                 ///< by them
   std::optional<double> largest_work;  ///< of several large clusters, where there are any
+  ExchangeFloors floors;               ///< that it was last asked for with
 
  private:
   double plain_sweeps_;
