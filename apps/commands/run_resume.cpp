@@ -51,6 +51,36 @@ std::optional<ResumePoint> read_point(const std::filesystem::path& path, const i
   return point;
 }
 
+/// Whether a sink that is asked for writes the file.
+bool goes_on(const std::string& file, const io::OutputSpec& output) {
+  return std::ranges::any_of(io::sink_registry(), [&](const auto& sink) {
+    return sink.make->writes(file) &&
+           (sink.make->use == io::SinkUse::always || output.sinks.contains(std::string(sink.name)));
+  });
+}
+
+/// Of a directory without scene.resolved.toml: throws naming a result of which nothing says whose it is.
+void demand_no_results(const std::filesystem::path& directory) {
+  for (const std::filesystem::path& path : io::outputs_in(directory, io::is_output_name)) {
+    const std::string whole = io::whole_name(path.string());
+    if (whole == "run.log" || whole == resolved_text) continue;
+    throw std::invalid_argument(fmt::format(
+        "{}: no {} beside it says of which scene it is, and --resume would replace it. Begin a run in "
+        "another directory, or give --force in place of --resume",
+        (directory / path).string(), resolved_text));
+  }
+}
+
+std::vector<io::SceneChange> changes_since(const std::filesystem::path& resolved, const std::string& then,
+                                           const io::Scene& scene) {
+  try {
+    return io::scene_changes(then, io::resolved_scene(scene));
+  } catch (const std::exception& error) {
+    throw std::invalid_argument(fmt::format("{}: {}, so that nobody knows of which scene the run there was",
+                                            resolved.string(), error.what()));
+  }
+}
+
 }  // namespace
 
 std::optional<ResumePoint> find_resume_point(const std::filesystem::path& directory, const io::Scene& scene,
@@ -102,18 +132,6 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
       point.path.string(), fmt::join(refused, "; ")));
 }
 
-namespace {
-
-/// Whether a sink that is asked for writes the file.
-bool goes_on(const std::string& file, const io::OutputSpec& output) {
-  return std::ranges::any_of(io::sink_registry(), [&](const auto& sink) {
-    return sink.make->writes(file) &&
-           (sink.make->use == io::SinkUse::always || output.sinks.contains(std::string(sink.name)));
-  });
-}
-
-}  // namespace
-
 void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
                          const io::OutputMark& mark) {
   for (const auto& [name, known] : mark.files) {
@@ -133,30 +151,6 @@ void demand_files_of_run(const std::filesystem::path& directory, const io::Outpu
       refuse(fmt::format("the run wrote {} bytes until the checkpoint, and these are others", known.bytes));
   }
 }
-
-namespace {
-
-/// Of a directory without scene.resolved.toml: throws naming a result of which nothing says whose it is.
-void demand_no_results(const std::filesystem::path& directory) {
-  for (const std::filesystem::path& path : io::outputs_in(directory, io::is_output_name))
-    if (path != "run.log" && path.stem() != resolved_text && path != resolved_text)
-      throw std::invalid_argument(fmt::format(
-          "{}: no {} beside it says of which scene it is, and --resume would replace it. Begin a run in "
-          "another directory, or give --force in place of --resume",
-          (directory / path).string(), resolved_text));
-}
-
-std::vector<io::SceneChange> changes_since(const std::filesystem::path& resolved, const std::string& then,
-                                           const io::Scene& scene) {
-  try {
-    return io::scene_changes(then, io::resolved_scene(scene));
-  } catch (const std::exception& error) {
-    throw std::invalid_argument(fmt::format("{}: {}, so that nobody knows of which scene the run there was",
-                                            resolved.string(), error.what()));
-  }
-}
-
-}  // namespace
 
 void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
   const std::filesystem::path resolved = directory / resolved_text, run_json = directory / "run.json";

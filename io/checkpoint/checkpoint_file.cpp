@@ -16,6 +16,7 @@
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/hdf5_write.hpp"
 #include "io/files/error.hpp"
+#include "io/files/output_directory.hpp"
 
 namespace talus::io {
 
@@ -31,7 +32,10 @@ static_assert(std::endian::native == std::endian::little, "rows are written as t
 
 constexpr std::int64_t format_version = 7;
 
-/// 64 bits of every byte and its place; no cryptography, but any flipped bit shows.
+/// 64 bits of every byte and its place; no cryptography, but any flipped bit shows. The CRC-32 of
+/// io/files/crc.hpp is as fast and would do for columns, too, but another checksum is another version of the
+/// format: nobody could go on from the checkpoints there are, for twenty lines less. HDF5's own checksums of
+/// data need datasets in chunks, into which ranks cannot write at a known place.
 std::uint64_t checksum(std::span<const std::byte> bytes) {
   std::uint64_t hash = 0x9e3779b97f4a7c15ULL ^ bytes.size();
   const auto mix = [&hash](std::uint64_t word) {
@@ -228,7 +232,7 @@ void write_own_rows(const std::string& path, const Checkpoint& state, const std:
 
 std::int64_t write_checkpoint(const std::filesystem::path& path, const CheckpointFile& content,
                               const graph::Communicator& ranks) {
-  const std::string unfinished = path.string() + ".part";
+  const std::string unfinished = path.string().append(unfinished_ending);
   const bool first = ranks.rank() == 0;
   const std::vector<std::int32_t>& here = content.state.here;
   const std::vector<RowCount> rows = count_rows(content.state, here, ranks);

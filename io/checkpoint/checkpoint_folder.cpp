@@ -54,10 +54,8 @@ void remove_old_checkpoints(const fs::path& directory, int keep) {
   for (const fs::path& path : checkpoints_in(directory))
     if (is_rolling(path.filename().string()) && ++kept > keep) fs::remove(path, ignored);
   for (const auto& entry : fs::directory_iterator(directory, ignored)) {
-    const std::string name = entry.path().filename().string();
-    constexpr std::string_view part = ".part";
-    if (name.ends_with(part) && is_checkpoint_name(name.substr(0, name.size() - part.size())))
-      fs::remove(entry.path(), ignored);
+    const std::string name = entry.path().filename().string(), whole = whole_name(name);
+    if (whole != name && is_checkpoint_name(whole)) fs::remove(entry.path(), ignored);
   }
 }
 

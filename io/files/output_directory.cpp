@@ -21,17 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view unfinished = ".part";
-
-/// The name that a file has when it is whole: without ".part", or ".PID.part".
-std::string whole_name(std::string name) {
-  if (!name.ends_with(unfinished)) return name;
-  name.resize(name.size() - unfinished.size());
-  const std::size_t digits = name.find_last_not_of("0123456789") + 1;
-  if (digits > 1 && digits < name.size() && name[digits - 1] == '.') name.resize(digits - 1);
-  return name;
-}
-
 /// A symbolic link in the place of a file or folder that a run may write, relative; empty: there is none.
 /// Files are opened by name, so that results would go where it leads.
 fs::path link_in_the_way(const fs::path& directory, IsOutputName is_ours) {
@@ -48,6 +37,14 @@ fs::path link_in_the_way(const fs::path& directory, IsOutputName is_ours) {
 }
 
 }  // namespace
+
+std::string whole_name(std::string name) {
+  if (!name.ends_with(unfinished_ending)) return name;
+  name.resize(name.size() - unfinished_ending.size());
+  const std::size_t digits = name.find_last_not_of("0123456789") + 1;
+  if (digits > 1 && digits < name.size() && name[digits - 1] == '.') name.resize(digits - 1);
+  return name;
+}
 
 bool is_numbered_name(std::string_view name, std::string_view prefix, std::string_view suffix) {
   if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
@@ -157,7 +154,7 @@ void check_output_files(const std::vector<fs::path>& inputs, const std::vector<f
 
 void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
   fs::path temporary = path;
-  temporary += unfinished;
+  temporary += unfinished_ending;
   const auto discard = [&] {
     std::error_code ignored;
     fs::remove(temporary, ignored);

@@ -16,6 +16,11 @@ namespace talus::io {
 /// Tells from the name of a whole file, relative to a directory, whether a command of Talus wrote it.
 using IsOutputName = bool (*)(const std::string& name);
 
+/// Ends the name of a file that is being written.
+inline constexpr std::string_view unfinished_ending = ".part";
+/// The name that a file has when it is whole: without ".part", or ".PID.part".
+std::string whole_name(std::string name);
+
 /// True for `prefix`, six digits or more, `suffix`.
 bool is_numbered_name(std::string_view name, std::string_view prefix, std::string_view suffix);
 
