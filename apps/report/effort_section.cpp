@@ -125,7 +125,7 @@ HtmlSections left_out_section(const RunFolder& run) {
   line(!setup.rotation, "rotation", "no levers in the sweeps, no angular velocities");
   line(!setup.orientation && setup.clumps.empty(), "orientations", "32 bytes a grain; spheres need none");
   for (const Attraction* attraction : attractions)
-    line(!any_law(*attraction), attraction->name, "no force that holds grains together");
+    line(!any_law(*attraction), attraction->name, "no such force between grains");
   line(!any_law(&PairLaw::rolling_resistance), "rolling resistance", "no moments at contacts");
   line(!any_law(&PairLaw::restitution), "restitution", "no velocities of before the step at contacts");
   line(setup.clumps.empty(), "shapes other than spheres", "contacts are diagonal: no 3x3 problems");

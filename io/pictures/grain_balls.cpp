@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "io/files/error.hpp"
 #include "io/results/results.hpp"
 
 namespace talus::io {
@@ -10,9 +11,16 @@ GrainShapes grain_shapes(std::span<const Clump> clumps, bool inserts, const std:
   GrainShapes shapes;
   if (clumps.empty()) return shapes;
   shapes.clump = clumps.front();
-  if (!inserts || !std::filesystem::exists(results) || frame_count(results) == 0) return shapes;
-  const Frame first = read_frame(results, 0, FrameParts::places);
-  shapes.spheres_from = first.id.empty() ? 0 : std::ranges::max(first.id) + 1;
+  if (!inserts || !std::filesystem::exists(results)) return shapes;
+  try {
+    if (frame_count(results) == 0) return shapes;
+    const Frame first = read_frame(results, 0, FrameParts::places);
+    shapes.spheres_from = first.id.empty() ? 0 : std::ranges::max(first.id) + 1;
+    // Who has come since then cannot be told from who was there.
+    if (first.step > 0) shapes.clump.reset();
+  } catch (const FileError&) {  // a picture need not end the run
+    shapes.clump.reset();
+  }
   return shapes;
 }
 

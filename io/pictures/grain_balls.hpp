@@ -21,7 +21,8 @@ struct GrainShapes {
 };
 
 /// Of a setup with these clumps. Where it `inserts` spheres among them, their ids follow those of the first
-/// frame of `results`, which has the grains of the samples alone; else no file is read.
+/// frame of `results`, if that is of the beginning and so has the grains of the samples alone; if it is later
+/// or cannot be read, all are drawn as the spheres that hold them. Else no file is read.
 GrainShapes grain_shapes(std::span<const Clump> clumps, bool inserts, const std::filesystem::path& results);
 
 /// A sphere of a picture: a grain, or a ball of it.

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "io/scene/detail/toml_document.hpp"
+#include "kernels/law/law_numbers.hpp"
 
 namespace talus::io {
 
@@ -80,6 +81,12 @@ bool may_change(const std::string& key) {
          std::ranges::find(loads, last) != loads.end();
 }
 
+/// A number of the law between materials is 0 where the version that wrote the scene did not know it.
+bool was_zero(const std::string& key) {
+  const std::string_view last = std::string_view(key).substr(key.rfind('.') + 1);
+  return std::ranges::any_of(law_numbers(), [&](const LawNumberEntry& entry) { return last == entry.name; });
+}
+
 }  // namespace
 
 std::vector<SceneChange> scene_changes(const std::string& was, const std::string& is) {
@@ -91,7 +98,8 @@ std::vector<SceneChange> scene_changes(const std::string& was, const std::string
   };
   for (const Leaves* leaves : {&before, &now})
     for (const auto& [key, value] : *leaves)
-      if (value_in(before, key) != value_in(now, key))
+      if (value_in(before, key) != value_in(now, key) &&
+          !(!before.contains(key) && value_in(now, key) == "0" && was_zero(key)))
         changes[key] = {key, value_in(before, key), value_in(now, key), may_change(key)};
   std::vector<SceneChange> sorted;
   for (auto& [key, change] : changes) sorted.push_back(std::move(change));

@@ -11,6 +11,8 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <new>
+#include <stdexcept>
 #include <string_view>
 #include <system_error>
 
@@ -66,9 +68,11 @@ void limit_child(rlim_t bytes) {
 }
 
 // What the child says at its end, followed by the words of the error. One that says nothing is dead.
-constexpr char went_well = '+', refused = '-';
+constexpr char went_well = '+', refused = '-', our_fault = '!';
 
-[[noreturn]] void be_the_child(int verdict, const std::string& path, const std::function<void()>& work) {
+// What escapes here ends the child, as a crash does: it must not unwind what its parent was about.
+[[noreturn]] void be_the_child(int verdict, const std::string& path,
+                               const std::function<void()>& work) noexcept {
   std::error_code unknown;
   const auto bytes = std::filesystem::file_size(path, unknown);
   limit_child(unknown ? 0 : bytes);
@@ -78,7 +82,9 @@ constexpr char went_well = '+', refused = '-';
     words = went_well;
   } catch (const FileError& error) {
     words = refused + std::string(error.what());
-  } catch (...) {  // no memory left below the limit
+  } catch (const std::bad_alloc&) {  // no memory left below the limit
+  } catch (const std::exception& error) {
+    words = our_fault + std::string(error.what());
   }
   for (std::string_view rest = words; !rest.empty();) {
     const ssize_t written = ::write(verdict, rest.data(), rest.size());
@@ -86,6 +92,13 @@ constexpr char went_well = '+', refused = '-';
     rest.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(written, 0)));
   }
   ::_exit(0);  // without the cleaning at exit of MPI and of this process's own streams
+}
+
+/// By its limits of time, or from outside: that may have happened to a whole file, too.
+bool was_stopped(int status) {
+  if (!WIFSIGNALED(status)) return false;
+  const int signal = WTERMSIG(status);
+  return signal == SIGALRM || signal == SIGXCPU || signal == SIGKILL;
 }
 
 std::string all_from(int pipe) {
@@ -104,16 +117,28 @@ bool done_in_a_child(const std::string& path, const std::string& remedy, const s
   int verdict[2];
   if (this_process_may_die || ::pipe2(verdict, O_CLOEXEC) != 0) return false;
   const pid_t child = ::fork();
-  if (child == 0) be_the_child(verdict[1], path, work);
+  if (child == 0) {
+    ::close(verdict[0]);
+    be_the_child(verdict[1], path, work);
+  }
   ::close(verdict[1]);
   // The words tell, and not the status, which the system drops where children are ignored (SIGCHLD).
   const std::string words = child > 0 ? all_from(verdict[0]) : "";
   ::close(verdict[0]);
   if (child < 0) return false;
-  while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+  int status = 0;
+  pid_t ended = 0;
+  while ((ended = ::waitpid(child, &status, 0)) < 0 && errno == EINTR) {
   }
+  if (words.empty() && ended == child && was_stopped(status))
+    throw FileError(
+        path,
+        "is damaged, or this machine is too busy to read it: HDF5 took more time than such a file "
+        "needs. Try again; " +
+            remedy);
   if (words.empty()) throw FileError(path, "is damaged: HDF5 would crash or run wild in it; " + remedy);
   if (words.front() == went_well) return true;
+  if (words.front() == our_fault) throw std::logic_error(path + ": " + words.substr(1));
   const std::string told = words.substr(1), prefix = path + ": ";
   throw FileError(path, told.starts_with(prefix) ? told.substr(prefix.size()) : told);
 }

@@ -35,11 +35,15 @@ class Rehearsal : public testing::Test {
 
   test::ScratchDirectory scratch_;
   const std::string path_ = (scratch_ / "file.h5").string();
+  const std::string too_late_ =
+      path_ +
+      ": is damaged, or this machine is too busy to read it: HDF5 took more time than such a file needs. Try "
+      "again; write it again";
   const std::string damaged_ = path_ + ": is damaged: HDF5 would crash or run wild in it; write it again";
 };
 
 TEST_F(Rehearsal, OfWhatCrashesIsAnErrorWithTheRemedy) {
-  EXPECT_EQ(refusal_of([] { std::raise(SIGKILL); }), damaged_);
+  EXPECT_EQ(refusal_of([] { std::raise(SIGSEGV); }), damaged_);
   EXPECT_EQ(refusal_of([] { throw std::bad_alloc(); }), damaged_);
 }
 
@@ -48,7 +52,16 @@ TEST_F(Rehearsal, OfWhatHasNoEndIsAnErrorWithinSeconds) {
               for (volatile bool on = true; on;) {
               }
             }),
-            damaged_);
+            too_late_);
+}
+
+/// The file may be whole where the system ended its reader.
+TEST_F(Rehearsal, ThatSomebodyKillsIsToBeTriedAgain) {
+  EXPECT_EQ(refusal_of([] { std::raise(SIGKILL); }), too_late_);
+}
+
+TEST_F(Rehearsal, DoesNotTakeOurOwnFaultsForThoseOfTheFile) {
+  EXPECT_THROW(done_in_a_child(path_, "", [] { throw std::out_of_range("at(7)"); }), std::logic_error);
 }
 
 TEST_F(Rehearsal, OfWhatTakesFarMoreMemoryThanTheFileHasIsAnError) {

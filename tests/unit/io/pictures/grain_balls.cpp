@@ -95,6 +95,14 @@ TEST(GrainBalls, SpheresAmongClumpsHaveIdsBeyondThoseOfTheFirstFrame) {
   EXPECT_GT(grain_shapes(clumps, false, results).spheres_from, 8) << "nothing is inserted";
   EXPECT_GT(grain_shapes(clumps, true, scratch / "none.h5").spheres_from, 8);
   EXPECT_FALSE(grain_shapes({}, true, results).clump);
+  // Of a first frame that is not of the beginning nobody can tell who was inserted; nor of one that is gone.
+  const std::filesystem::path later = scratch / "later.h5";
+  first.step = 5;
+  ResultsWriter(later, {}).append(first);
+  EXPECT_FALSE(grain_shapes(clumps, true, later).clump);
+  EXPECT_TRUE(grain_shapes(clumps, false, later).clump);
+  std::filesystem::resize_file(later, 100);
+  EXPECT_FALSE(grain_shapes(clumps, true, later).clump);
 }
 
 }  // namespace

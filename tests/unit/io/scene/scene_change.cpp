@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 namespace talus::scene_change_test {
 namespace {
 
@@ -45,6 +47,20 @@ TEST(SceneChanges, AreNamedAsSetNamesThem) {
                       "refused: stage.shear.friction was 0.35 and is 0.5",
                       "stage.shear.load.z+.velocity was [0, 0, -0.05] and is [0, 0, -0.1]",
                       "wall.z+.pressure was 10000 and is 20000"}));
+}
+
+/// Or no run of before could be gone on with after a law has been added.
+TEST(SceneChanges, AreNoneWhereAnEarlierVersionDidNotKnowANumberOfTheLawThatIsZero) {
+  std::string before;
+  std::istringstream lines(resolved({}));
+  for (std::string line; std::getline(lines, line);)
+    if (!line.starts_with("work_of_adhesion")) before += line + "\n";
+  ASSERT_NE(before, resolved({}));
+  EXPECT_TRUE(io::scene_changes(before, resolved({})).empty());
+  const auto changes = io::scene_changes(before, resolved({"material.work_of_adhesion=0.1"}));
+  ASSERT_FALSE(changes.empty());
+  EXPECT_FALSE(changes.front().allowed);
+  EXPECT_FALSE(io::scene_changes(resolved({"material.work_of_adhesion=0.1"}), before).empty());
 }
 
 /// A checkpoint has walls, stages and rules by their places in the scene.
