@@ -106,6 +106,12 @@ ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
   return active;
 }
 
+double difference(const BodyProblem& problem, const std::vector<Twist>& a, const std::vector<Twist>& b) {
+  std::vector<Twist> by(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) by[k] = {a[k].u - b[k].u, a[k].w - b[k].w};
+  return momentum_of(problem, by);
+}
+
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
 class Round {
  public:
@@ -119,13 +125,17 @@ class Round {
 
   /// The motion; the multipliers go to the set's `change`, what is missed and left to `result`.
   std::vector<Twist> solve(Correction& result) {
-    FirmContacts::Solution solution;
+    std::vector<Twist> motion(all_.bodies.size());
     for (int update = 0; update < thresholds_.most_updates; ++update) {
-      solution = firm_.solve(force());
+      FirmContacts::Solution solution = firm_.solve(force());
       result.left = momentum_of(all_, solution.last);
-      if (take_multipliers(solution.motion, result)) break;
+      const bool granted = take_multipliers(solution.motion, result);
+      result.updated = difference(all_, solution.motion, motion);
+      motion = std::move(solution.motion);
+      // Where geometry amplifies, wishes that are missed by next to nothing may hide much.
+      if (granted && result.updated <= goal_of(momentum_of(all_, motion), enough_, thresholds_)) break;
     }
-    return solution.motion;
+    return motion;
   }
 
  private:
@@ -167,12 +177,6 @@ class Round {
   ActiveProblem active_;
   FirmContacts firm_;
 };
-
-double difference(const BodyProblem& problem, const std::vector<Twist>& a, const std::vector<Twist>& b) {
-  std::vector<Twist> by(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) by[k] = {a[k].u - b[k].u, a[k].w - b[k].w};
-  return momentum_of(problem, by);
-}
 
 /// All bodies together, over the least effective mass of a contact.
 double mass_ratio(const BodyProblem& problem) {
@@ -237,13 +241,16 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     now.impulse = set.change;
     now.motion = motion;
     now.found = momentum_of(problem, motion);
+    const std::vector<ContactState> then = set.state;
     now.open = see_states(problem, motion, set);
     now.moved = difference(problem, motion, before);
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
-    if (apart <= thresholds.most_apart && at_first <= thresholds.exact * enough)
+    const bool stays = !friction && set.state == then;
+    if (apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && (friction || stays))
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);
-    now.settled = now.open <= goal && now.left <= enough && (!friction || (rounds > 1 && now.moved <= goal));
+    now.settled = now.open <= goal && now.updated <= goal && now.left <= enough &&
+                  (stays || (rounds > 1 && now.moved <= goal));
     if (now.settled || now.error() < least) {
       least = now.error();
       best = std::move(now);

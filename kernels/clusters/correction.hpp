@@ -48,14 +48,15 @@ struct Correction {
   double left = 0;            ///< what rounding may leave of the linear system [N s]
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
+  double updated = 0;         ///< likewise the last update of the multipliers
   int rounds = 0;
-  bool settled = false;  ///< no contact changed its state any more, but for what is small, and rounding
-                         ///< leaves less than need not be known
+  bool settled = false;  ///< no contact changed its state any more, or the one last round that did changed
+                         ///< next to nothing, and rounding leaves less than need not be known
 
   /// All of it [N s].
   double error() const { return found + uncertain(); }
   /// What is not known of it [N s].
-  double uncertain() const { return missed + open + left; }
+  double uncertain() const { return missed + open + left + updated; }
 };
 
 /// The Newton step from the impulses of `problem`. `enough`: momentum [N s] below which an error need not be
@@ -70,9 +71,11 @@ struct Correction {
 /// is solved by augmented Lagrangians: (M + H rho H^T) d = k + H (rho w + s), s += rho (w - H^T d). Contacts
 /// whose impulse would pull then open, and open ones that d closes join, and it is solved again. When no
 /// contact changes any more, and without friction, V + d is the exact solution of the step, since it and r +
-/// change satisfy all its conditions. With friction the direction of sliding is that of the last velocities:
-/// there it has settled when two rounds, one after the other, agree besides; where contacts carry more than
-/// they must, as in a jammed wedge, they may never do.
+/// change satisfy all its conditions. A contact that would change by next to nothing is given another round,
+/// and two rounds have to agree: a lattice whose contacts have tilted by 10^-5 amplifies what is wrong with
+/// one of them as much. With friction the direction of sliding is that of the last velocities: there two
+/// rounds have to agree in any case; where contacts carry more than they must, as in a jammed wedge, they may
+/// never do.
 Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
 

@@ -41,5 +41,45 @@ TEST(ClusterSolver, ChangesForcesWhoseVelocitiesAreWrongByTheScaleOfWhatTheyDo) 
               1e-6);
 }
 
+/// Two grains of 1 kg, each on a plane that leans by the sine `lean`, under a lid that comes down with 1 N s
+/// and is heavy or light. A grain that carries P gives way by P lean^2. Grain b is `gap` [m/s] further from
+/// the lid, so that P_a - P_b = gap/lean^2. The impulses leave all to grain a.
+BodyProblem under_a_lid(double lean, double gap, double lid_mass) {
+  BodyProblem problem;
+  const Vec3 plane(lean, 0, std::sqrt(1 - lean * lean));
+  for (std::int32_t k = 0; k < 2; ++k) {
+    add_grain(problem, k * Vec3::UnitX(), 0);
+    problem.bodies.back().free.u = Vec3::Zero();
+  }
+  BodyUnknown lid;
+  lid.mass = lid_mass;
+  lid.wall = true;
+  lid.axis = -Vec3::UnitZ();
+  lid.free.u = -Vec3::UnitZ() / lid_mass;
+  problem.bodies.push_back(lid);
+  for (std::int32_t k = 0; k < 2; ++k) add_contact(problem, k, -1, plane, 0, 0);
+  for (std::int32_t k = 0; k < 2; ++k) add_contact(problem, k, 2, -Vec3::UnitZ(), 0, 1);
+  problem.contacts[3].offset = -gap * Vec3::UnitZ();
+  // A millionth too much: the lid goes up, and grain b is free.
+  const double carried = 1 + 1e-6;
+  problem.impulse[0] = carried * plane.z() * plane;
+  problem.impulse[2] = -carried * Vec3::UnitZ();
+  return problem;
+}
+
+TEST(ClusterSolver, FindsWhoCarriesWhereAllButTheSameVelocitiesMeetTheLawButForRounding) {
+  for (const double lid_mass : {0.01, 1.0})
+    for (const double lean : {1e-1, 1e-2, 1e-3, 3e-4}) {
+      const double apart = 0.5;
+      const BodyProblem problem = under_a_lid(lean, apart * lean * lean, lid_mass);
+      const ClusterAnswer answer = solve_cluster(problem, {.enough = 1e-5, .relative = 1e-5, .sweeps = 100});
+      ASSERT_TRUE(answer.solved) << lean;
+      const double a = -(problem.impulse[2] + answer.impulse[2]).z(),
+                   b = -(problem.impulse[3] + answer.impulse[3]).z();
+      EXPECT_NEAR(a - b, apart, 1e-3) << lean << ' ' << lid_mass;
+      EXPECT_NEAR(a + b, 1, 0.1 * lean) << lean << ' ' << lid_mass;
+    }
+}
+
 }  // namespace
 }  // namespace talus::cluster_solver_test
