@@ -15,7 +15,7 @@ void Crew::share(std::size_t count, const std::function<void(std::size_t)>& work
   help();
   // A helper adds its piece to done_ only after its last use of `work`.
   for (int polls = 0; done_.load(std::memory_order_acquire) < count; ++polls)
-    if (polls < 256)
+    if (polls < polls_before_yield)
       pause();
     else
       std::this_thread::yield();
