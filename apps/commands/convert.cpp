@@ -12,6 +12,7 @@
 #include "apps/shared/print.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/results/grain_balls.hpp"
 #include "io/results/lammps_dump.hpp"
 #include "io/results/results.hpp"
 #include "io/results/vtkhdf.hpp"
@@ -26,6 +27,7 @@ namespace fs = std::filesystem;
 struct Conversion {
   fs::path results, out;
   std::size_t frames = 0;
+  io::GrainShapes shapes = {};  ///< spheres, unless the scene beside the results says otherwise
 };
 
 Conversion conversion_of(const ConvertOptions& options) {
@@ -43,17 +45,26 @@ Conversion conversion_of(const ConvertOptions& options) {
   sources.push_back(todo.results);  // whatever its name
   io::check_output_files(sources, {todo.out}, options.force);
   todo.frames = io::demand_frames(todo.results);
+  const fs::path folder = fs::absolute(todo.results).parent_path();
+  if (const auto scene = resolved_scene(folder))
+    todo.shapes = io::grain_shapes(scene->setup.clumps, !scene->setup.inserts.empty(), todo.results);
+  else if (fs::exists(folder / "scene.resolved.toml"))
+    print_error(
+        "talus: warning: {} cannot be read; clumps, if there are any, become the spheres that hold them\n",
+        (folder / "scene.resolved.toml").string());
   return todo;
 }
 
-/// Neither format has contacts.
+/// Neither format has contacts, nor shapes but spheres.
 Frame frame_of(const Conversion& todo, std::size_t k) {
-  return io::read_frame(todo.results, k, io::FrameParts::without_contacts);
+  Frame frame = io::read_frame(todo.results, k, io::FrameParts::without_contacts);
+  return todo.shapes.clump ? io::frame_of_balls(frame, todo.shapes) : frame;
 }
 
 void write_lammps(const Conversion& todo, const fs::path& part) {
   std::ofstream file(part, std::ios::binary);
-  for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(frame_of(todo, k));
+  const std::size_t balls = todo.shapes.clump ? todo.shapes.clump->balls.size() : 1;
+  for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(frame_of(todo, k), balls);
   file.close();
   if (!file) throw io::FileError(part.string(), "cannot be written: no room or no right to");
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -26,6 +27,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// 0, 1, 2. Throws std::invalid_argument.
+int axis_of(const std::string& name) {
+  if (name.size() != 1 || name[0] < 'x' || name[0] > 'z')
+    throw std::invalid_argument(fmt::format("--slice is '{}': x, y or z", name));
+  return name[0] - 'x';
+}
+
+/// A slice is seen along its axis unless something else is asked for; x, or y of a slice across x, to the
+/// right.
+io::Camera camera_of(const ViewCommandOptions& options) {
+  static constexpr std::array<io::Camera, 3> along{{{0, 0}, {-90, 0}, {-90, 90}}};
+  io::Camera camera;
+  if (!options.slice.empty()) camera = along[static_cast<std::size_t>(axis_of(options.slice))];
+  return {options.azimuth.value_or(camera.azimuth), options.elevation.value_or(camera.elevation)};
+}
+
 /// The frames of a run and how they are to be seen. Throws std::exception where options mean nothing.
 class Viewed {
  public:
@@ -33,11 +50,12 @@ class Viewed {
     const RunFolder run = read_run_folder(options.run);
     if (run.scene) {
       const Setup& setup = run.scene->setup;
-      walls_ = setup.walls;
+      walls_ = setup.walls, materials_ = setup.material_names;
       view_.shapes = io::grain_shapes(setup.clumps, !setup.inserts.empty(), results_);
     }
     view_.colour = io::grain_colours().named(options.colour).kind;
-    view_.camera = {options.azimuth, options.elevation};
+    view_.camera = camera_of(options);
+    if (!options.slice.empty()) view_.slice = axis_of(options.slice);
     view_.width = static_cast<std::size_t>(options.width);
     if (!fs::exists(results_))
       throw std::invalid_argument(fmt::format("{}: no results.h5 of a run there", options.run));
@@ -51,7 +69,8 @@ class Viewed {
   /// With what its colours are made of.
   Frame frame(std::size_t k) const {
     using enum io::GrainColour;
-    const bool forces = view_.colour == force, speeds = view_.colour == speed;
+    const bool forces = view_.colour == force,
+               speeds = view_.colour == speed || io::velocity_axis(view_.colour);
     return io::read_frame(results_, k,
                           forces   ? io::FrameParts::all
                           : speeds ? io::FrameParts::without_contacts
@@ -71,7 +90,7 @@ class Viewed {
       const io::ColourRange colours = io::colour_range(values, view_.colour);
       box = first ? of_frame : Bounds{box.low.cwiseMin(of_frame.low), box.high.cwiseMax(of_frame.high)};
       first = false;
-      if (std::ranges::max(values) <= 0) continue;
+      if (std::ranges::all_of(values, [](double value) { return value == 0; })) continue;
       range = range ? io::ColourRange{std::min(range->low, colours.low), std::max(range->high, colours.high)}
                     : colours;
     }
@@ -84,6 +103,7 @@ class Viewed {
     const Frame shown = frame(k);
     return io::png_bytes(io::render_view(shown, walls_, triangles(shown), view_));
   }
+  std::string picture(std::size_t k) const { return io::draw_view(frame(k), walls_, view_, materials_); }
   std::string scale() const {
     return view_.range ? fmt::format("{} from {:.3g} to {:.3g}", io::label_of(view_.colour), view_.range->low,
                                      view_.range->high)
@@ -93,6 +113,7 @@ class Viewed {
  private:
   fs::path results_;
   std::vector<Wall> walls_;
+  std::vector<std::string> materials_;
   io::ViewOptions view_;
   std::size_t frames_ = 0;
 };
@@ -151,7 +172,8 @@ int view_command(const ViewCommandOptions& options) {
     if (k < 0 || k >= frames)
       throw std::invalid_argument(fmt::format("--frame is {}, there are {} frames", options.frame, frames));
     io::check_output_files(sources_in(options.run), {out}, options.force);
-    image = viewed.image(static_cast<std::size_t>(k));
+    const auto which = static_cast<std::size_t>(k);
+    image = out.extension() == ".svg" ? viewed.picture(which) : viewed.image(which);
   } catch (const std::exception& error) {
     return refuse(error, exit_bad_input);
   }

@@ -20,6 +20,23 @@ std::vector<std::filesystem::path> sources_in(const std::filesystem::path& direc
   return files;
 }
 
+namespace {
+
+std::string resolved_text(const std::filesystem::path& directory) {
+  std::ifstream file(directory / "scene.resolved.toml", std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+std::optional<io::Scene> resolved_scene(const std::filesystem::path& directory) {
+  try {
+    return io::parse_scene(resolved_text(directory), (directory / "scene.resolved.toml").string());
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
 RunFolder read_run_folder(const std::filesystem::path& directory) {
   if (!std::filesystem::exists(directory / "run.json"))
     throw std::invalid_argument(fmt::format("{}: no run was begun there", directory.string()));
@@ -29,13 +46,8 @@ RunFolder read_run_folder(const std::filesystem::path& directory) {
   run.provenance = all.value("provenance", json::object());
   run.summary = all.value("summary", json::object());
   run.status = read_status_json(directory);
-  std::ifstream file(directory / "scene.resolved.toml", std::ios::binary);
-  run.resolved.assign(std::istreambuf_iterator<char>(file), {});
-  try {
-    run.scene = io::parse_scene(run.resolved, (directory / "scene.resolved.toml").string());
-  } catch (const std::exception&) {
-    // Its words need the scene; everything else is told without it.
-  }
+  run.resolved = resolved_text(directory);
+  run.scene = resolved_scene(directory);  // its words need the scene; everything else is told without it
   run.steps = io::read_columns(
       directory / "steps.csv",
       {"step", "time", "time_step", "contacts", "active", "iterations", "error_rms", "error_max", "balance",

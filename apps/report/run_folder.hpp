@@ -25,6 +25,10 @@ struct RunFolder {
 /// The files of a run that pictures, pages and other formats are made from, which none of them may replace.
 std::vector<std::filesystem::path> sources_in(const std::filesystem::path& directory);
 
+/// What scene.resolved.toml holds; none where it is not there, cannot be read, or the files that it names are
+/// gone.
+std::optional<io::Scene> resolved_scene(const std::filesystem::path& directory);
+
 /// Throws std::invalid_argument where no run was begun, io::FileError where run.json or a table is not as
 /// Talus wrote it.
 RunFolder read_run_folder(const std::filesystem::path& directory);

@@ -47,7 +47,8 @@ function draw() {
   const near = (x, y, z) => ce * ca * x + ce * sa * y + se * z;
   const lines = front => {
     pen.strokeStyle = front ? "rgba(70,80,92,0.55)" : "rgba(70,80,92,0.9)"; pen.lineWidth = 1; pen.beginPath();
-    for (const l of data.walls) {
+    for (const l of data.walls.concat(data.bends)) {
+      if (l.length > 6 && near(l[6], l[7], l[8]) * near(l[9], l[10], l[11]) >= 0) continue;
       const m = near((l[0] + l[3]) / 2, (l[1] + l[4]) / 2, (l[2] + l[5]) / 2);
       if ((m > 0) !== front) continue;
       pen.moveTo(right(l[0], l[1]), down(l[0], l[1], l[2])); pen.lineTo(right(l[3], l[4]), down(l[3], l[4], l[5]));

@@ -77,7 +77,7 @@ Colouring colouring(const Frame& frame, io::GrainColour colour, const std::vecto
 }
 
 /// What the script reads. Lengths are over the longest edge of the box; places from its lower corner, for
-/// lines of walls from its middle.
+/// lines of walls from its middle. Behind the ends of a bend stand its normals.
 json live_data(const Frame& frame, const io::GrainShapes& shapes,
                const std::vector<std::vector<Triangle>>& walls, const std::vector<std::string>& materials) {
   const Bounds box = io::view_bounds(frame, walls);
@@ -100,22 +100,31 @@ json live_data(const Frame& frame, const io::GrainShapes& shapes,
     for (const Colouring& colour : colours) bytes.push_back(colour.values[grain]);
   }
   const Vec3 middle = (box.low + box.high) / 2;
-  json lines = json::array(), words = json::array();
+  json lines = json::array(), bends = json::array(), words = json::array();
   const auto rounded = [&](double length) { return std::round(1e5 * length / longest) / 1e5; };
-  const auto add = [&](const Vec3& a, const Vec3& b) {
-    const Vec3 from = a - middle, to = b - middle;
-    lines.push_back({rounded(from.x()), rounded(from.y()), rounded(from.z()), rounded(to.x()),
-                     rounded(to.y()), rounded(to.z())});
+  const auto line_of = [&](const std::array<Vec3, 2>& ends) {
+    json line = json::array();
+    for (const Vec3& end : ends)
+      for (int axis = 0; axis < 3; ++axis) line.push_back(rounded(end[axis] - middle[axis]));
+    return line;
   };
-  for (const std::vector<Triangle>& wall : walls)
-    for (const auto& [a, b] : io::edges_of(wall)) add(a, b);
-  for (const io::CellLine& line : io::lines_of_cell(frame)) add(line.ends[0], line.ends[1]);
+  for (const std::vector<Triangle>& wall : walls) {
+    for (const auto& ends : io::edges_of(wall)) lines.push_back(line_of(ends));
+    for (const io::Bend& bend : io::bends_of(wall)) {
+      json line = line_of(bend.ends);
+      for (const Vec3& normal : bend.normals)
+        for (int axis = 0; axis < 3; ++axis) line.push_back(std::round(1e4 * normal[axis]) / 1e4);
+      bends.push_back(std::move(line));
+    }
+  }
+  for (const io::CellLine& line : io::lines_of_cell(frame)) lines.push_back(line_of(line.ends));
   for (const Colouring& colour : colours) words.push_back(colour.words);
   const io::Camera camera;
   return {{"grains", io::detail::base64_of(std::as_bytes(std::span(bytes)))},
           {"size", {size.x() / longest, size.y() / longest, size.z() / longest}},
           {"colours", words},
           {"walls", lines},
+          {"bends", bends},
           {"azimuth", camera.azimuth},
           {"elevation", camera.elevation}};
 }

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <system_error>
 
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
+#include "io/results/grain_balls.hpp"
 #include "io/results/vtk.hpp"
 #include "io/results/wall_triangles.hpp"
 
@@ -26,6 +28,8 @@ class FieldSink : public OutputSink {
         contacts_(context.contacts),
         walls_(context.walls),
         periodic_(context.periodic),
+        clumps_(context.clumps),
+        inserts_(context.inserts),
         ranks_(context.ranks) {
     for (const Wall& wall : walls_) wall_materials_.push_back(wall.material);
   }
@@ -57,7 +61,12 @@ class FieldSink : public OutputSink {
   }
 
   void frame(const Frame& part) override {
-    write(grains_name(frames_), [&](const WriteText& out) { write_grains_vtp(part, ranks_, out); });
+    // The frame is in results.h5 already: that sink comes first.
+    if (!shapes_) shapes_ = grain_shapes(clumps_, inserts_, directory_ / "results.h5", ranks_);
+    write(grains_name(frames_), [&](const WriteText& out) {
+      shapes_->clump ? write_grains_vtp(frame_of_balls(part, *shapes_), ranks_, out)
+                     : write_grains_vtp(part, ranks_, out);
+    });
     const bool forces = contacts_ && part.with_contacts;
     if (forces)
       write(forces_name(frames_), [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
@@ -124,6 +133,9 @@ class FieldSink : public OutputSink {
   bool contacts_;
   std::vector<Wall> walls_;
   bool periodic_;
+  std::vector<Clump> clumps_;
+  bool inserts_;
+  std::optional<GrainShapes> shapes_;  ///< once a frame was written
   std::vector<std::int64_t> wall_materials_;
   const graph::Communicator& ranks_;
   std::vector<FieldFile> grain_files_, force_files_, wall_files_, cell_files_;  ///< paths relative to fields/

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "io/pictures/grain_balls.hpp"
+#include "io/results/grain_balls.hpp"
 #include "io/results/grain_load.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "runtime/graph/communicator.hpp"

@@ -211,6 +211,33 @@ class Canvas {
   std::vector<float> depth_;
 };
 
+struct ByEnds {
+  bool operator()(const std::array<Vec3, 2>& a, const std::array<Vec3, 2>& b) const {
+    const auto numbers = [](const std::array<Vec3, 2>& e) {
+      return std::tuple(e[0].x(), e[0].y(), e[0].z(), e[1].x(), e[1].y(), e[1].z());
+    };
+    return numbers(a) < numbers(b);
+  }
+};
+/// Unit normals of the triangles at each edge, whose ends stand in a fixed order.
+std::map<std::array<Vec3, 2>, std::vector<Vec3>, ByEnds> edges_with_normals(
+    std::span<const Triangle> triangles) {
+  std::map<std::array<Vec3, 2>, std::vector<Vec3>, ByEnds> edges;
+  for (const Triangle& t : triangles) {
+    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::array<Vec3, 2> ends{t[k], t[(k + 1) % 3]};
+      if (ByEnds()({ends[1], ends[0]}, ends)) std::swap(ends[0], ends[1]);
+      edges[ends].push_back(normal);
+    }
+  }
+  return edges;
+}
+bool is_smooth(const std::vector<Vec3>& normals) {
+  static const double flat = std::cos(std::numbers::pi / 6);
+  return normals.size() == 2 && std::abs(normals[0].dot(normals[1])) >= flat;
+}
+
 Vec3 centre_of(const Triangle& t) {
   return (t[0] + t[1] + t[2]) / 3;
 }
@@ -239,6 +266,24 @@ void draw_wall(Canvas& canvas, const Projection& view, const Wall& wall, const V
                     {bright, bright, std::min(1.0, bright + 0.015)});
   }
   for (const auto& [a, b] : edges_of(triangles)) canvas.line(view.of(a), view.of(b), edge_colour);
+  for (const Bend& bend : bends_of(triangles))
+    if (bend.outlines(view.axes.viewer))
+      canvas.line(view.of(bend.ends[0]), view.of(bend.ends[1]), edge_colour);
+}
+
+/// The balls of the slice that is asked for, or all.
+std::vector<SeenBall> shown_balls(const Frame& frame, const ViewOptions& options) {
+  std::vector<SeenBall> balls = seen_balls(frame, options.shapes);
+  if (!options.slice || frame.x.empty()) return balls;
+  const auto place = [&](const Vec3& x) { return x[*options.slice]; };
+  double low = infinity, high = -infinity;
+  for (const Vec3& x : frame.x) low = std::min(low, place(x)), high = std::max(high, place(x));
+  const double half = 2 * std::accumulate(frame.radius.begin(), frame.radius.end(), 0.0) /
+                      static_cast<double>(frame.radius.size());
+  std::erase_if(balls, [&](const SeenBall& ball) {
+    return std::abs(place(frame.x[ball.grain]) - (low + high) / 2) > half;
+  });
+  return balls;
 }
 
 /// Balls in the order in which they hide one another: behind those that are drawn there is nothing to do.
@@ -277,25 +322,21 @@ Bounds view_bounds(const Frame& frame, std::span<const std::vector<Triangle>> wa
 }
 
 std::vector<std::array<Vec3, 2>> edges_of(std::span<const Triangle> triangles) {
-  const double flat = std::cos(std::numbers::pi / 6);
-  const auto less = [](const Vec3& a, const Vec3& b) {
-    return std::tuple(a.x(), a.y(), a.z()) < std::tuple(b.x(), b.y(), b.z());
-  };
-  const auto less_ends = [&](const std::array<Vec3, 2>& a, const std::array<Vec3, 2>& b) {
-    return less(a[0], b[0]) || (!less(b[0], a[0]) && less(a[1], b[1]));
-  };
-  std::map<std::array<Vec3, 2>, std::vector<Vec3>, decltype(less_ends)> edges(less_ends);
-  for (const Triangle& t : triangles) {
-    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 &a = t[k], &b = t[(k + 1) % 3];
-      edges[less(a, b) ? std::array<Vec3, 2>{a, b} : std::array<Vec3, 2>{b, a}].push_back(normal);
-    }
-  }
   std::vector<std::array<Vec3, 2>> sharp;
-  for (const auto& [ends, normals] : edges)
-    if (normals.size() != 2 || std::abs(normals[0].dot(normals[1])) < flat) sharp.push_back(ends);
+  for (const auto& [ends, normals] : edges_with_normals(triangles))
+    if (!is_smooth(normals)) sharp.push_back(ends);
   return sharp;
+}
+
+std::vector<Bend> bends_of(std::span<const Triangle> triangles) {
+  constexpr double plane = 1 - 1e-9;
+  std::vector<Bend> bends;
+  for (const auto& [ends, normals] : edges_with_normals(triangles)) {
+    if (!is_smooth(normals)) continue;
+    const double along = normals[0].dot(normals[1]);
+    if (std::abs(along) < plane) bends.push_back({ends, {normals[0], along < 0 ? -normals[1] : normals[1]}});
+  }
+  return bends;
 }
 
 Image render_view(const Frame& frame, std::span<const Wall> walls,
@@ -309,7 +350,7 @@ Image render_view(const Frame& frame, std::span<const Wall> walls,
   Canvas canvas(view);
   const std::vector<double> values = grain_values(frame, options.colour);
   const ColourRange range = options.range.value_or(colour_range(values, options.colour));
-  const std::vector<SeenBall> balls = seen_balls(frame, options.shapes);
+  const std::vector<SeenBall> balls = shown_balls(frame, options);
   double radii = 0;
   for (const std::size_t k : nearest_first(balls, view.axes.viewer)) {
     const auto& [centre, radius, grain] = balls[k];

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "io/files/png.hpp"
-#include "io/pictures/grain_balls.hpp"
 #include "io/results/cell_outline.hpp"
+#include "io/results/grain_balls.hpp"
 #include "kernels/registry.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "runtime/step/frame.hpp"
@@ -19,10 +19,14 @@
 namespace talus::io {
 
 /// What grains are coloured by.
-enum class GrainColour { speed, radius, force, material };
+enum class GrainColour { speed, velocity_x, velocity_y, velocity_z, radius, force, material };
 
 /// What they are called, what they are, and in which unit ("" for none).
 const Registry<GrainColour, const char*>& grain_colours();
+
+/// Along which axis a component of the velocity points: 0, 1, 2; none of other colours. Its scale reaches as
+/// far below 0 as above.
+std::optional<int> velocity_axis(GrainColour colour);
 
 /// A number for each grain of a frame. `force` is the sum of the normal forces of its contacts [N].
 std::vector<double> grain_values(const Frame& frame, GrainColour colour);
@@ -31,7 +35,8 @@ std::vector<double> grain_values(const Frame& frame, GrainColour colour);
 struct ColourRange {
   double low = 0, high = 0;
 };
-/// From 0, or of radii the smallest, to the value that 49 of 50 do not exceed.
+/// From 0, or of radii the smallest, to the value that 49 of 50 do not exceed; of a component of the velocity
+/// from minus to plus the magnitude that 49 of 50 do not exceed.
 ColourRange colour_range(std::span<const double> values, GrainColour colour);
 
 /// Red, green and blue, 0 to 1, of a value on the scale, or of a material by its number.
@@ -52,6 +57,8 @@ struct ViewOptions {
   GrainColour colour = GrainColour::speed;
   std::optional<ColourRange> range = {};  ///< none: that of the frame
   std::optional<Bounds> box = {};         ///< that fills the image; none: grains and walls of the frame
+  std::optional<int> slice = {};          ///< 0, 1, 2: only grains whose centres lie within two mean radii of
+                                          ///< the middle of all centres along x, y, z
   GrainShapes shapes = {};                ///< of the run
 };
 
@@ -69,6 +76,15 @@ Image render_view(const Frame& frame, std::span<const Wall> walls,
 
 /// Edges of the triangles of a wall: where they end, or meet at more than 30 degrees.
 std::vector<std::array<Vec3, 2>> edges_of(std::span<const Triangle> triangles);
+
+/// Where a surface bends: an edge at which two triangles meet at less than that, but not in one plane. It is
+/// an outline of the wall for those who see one of its triangles from the front and the other from behind.
+struct Bend {
+  std::array<Vec3, 2> ends;     ///< [m]
+  std::array<Vec3, 2> normals;  ///< unit, of the triangles, to the same side
+  bool outlines(const Vec3& viewer) const { return normals[0].dot(viewer) * normals[1].dot(viewer) < 0; }
+};
+std::vector<Bend> bends_of(std::span<const Triangle> triangles);
 
 /// The view with its scale of colours, as SVG text.
 std::string draw_view(const Frame& frame, std::span<const Wall> walls, const ViewOptions& options,

@@ -35,19 +35,24 @@ std::string box_of(const Frame& frame) {
 
 }  // namespace
 
-std::string lammps_dump(const Frame& frame) {
+std::string lammps_dump(const Frame& frame, std::size_t balls) {
   std::string text =
       fmt::format("ITEM: UNITS\nsi\nITEM: TIME\n{}\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{}\n{}",
                   frame.time, frame.step, frame.id.size(), box_of(frame));
   const auto out = std::back_inserter(text);
-  text += "ITEM: ATOMS id type radius x y z vx vy vz";
+  text += balls > 1 ? "ITEM: ATOMS id mol type" : "ITEM: ATOMS id type";
+  text += " radius x y z vx vy vz";
   if (!frame.omega.empty()) text += " omegax omegay omegaz";
   if (!frame.orientation.empty()) text += " quatw quati quatj quatk";
   text += '\n';
   const auto put = [&](const Vec3& v) { fmt::format_to(out, " {} {} {}", v[0], v[1], v[2]); };
+  std::int64_t ball = 0;  // of its grain
   for (std::size_t k = 0; k < frame.id.size(); ++k) {
-    const std::int64_t material = frame.material.empty() ? 0 : frame.material[k];
-    fmt::format_to(out, "{} {} {}", frame.id[k] + 1, material + 1, frame.radius[k]);
+    const std::int64_t material = frame.material.empty() ? 0 : frame.material[k], grain = frame.id[k];
+    ball = k > 0 && frame.id[k - 1] == grain ? ball + 1 : 0;
+    fmt::format_to(out, "{}", grain * static_cast<std::int64_t>(balls) + ball + 1);
+    if (balls > 1) fmt::format_to(out, " {}", grain + 1);
+    fmt::format_to(out, " {} {}", material + 1, frame.radius[k]);
     put(frame.x[k]);
     put(frame.u[k]);
     if (!frame.omega.empty()) put(frame.omega[k]);

@@ -2,6 +2,7 @@
 
 /// Frames as the text of a LAMMPS dump, which OVITO, VMD, Pizza.py and LAMMPS' own read_dump take.
 
+#include <cstddef>
 #include <string>
 
 #include "runtime/step/frame.hpp"
@@ -12,6 +13,8 @@ namespace talus::io {
 /// BOUNDS (of the grains, not periodic) and ATOMS with id, type, radius [m], x y z [m], vx vy vz [m/s], and
 /// omegax omegay omegaz [rad/s] and quatw quati quatj quatk where the frame has them. LAMMPS counts from 1:
 /// id and type are id + 1 and material + 1 of results.h5. Numbers read back to the same bits.
-std::string lammps_dump(const Frame& frame);
+/// A frame of balls (grain_balls.hpp), of which a grain has up to `balls` > 1 behind one another, has id =
+/// balls times that of the grain + 1, + 2, ... and a column mol, the grain's id + 1.
+std::string lammps_dump(const Frame& frame, std::size_t balls = 1);
 
 }  // namespace talus::io

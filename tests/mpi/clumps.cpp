@@ -57,6 +57,7 @@ TEST_F(ClumpsOnRanks, ChangeNoBitWithRanksAndThreads) {
     EXPECT_EQ(digest_of("one"), digest_of("two"));
     EXPECT_EQ(digest_of("one"), digest_of("three"));
     EXPECT_EQ(file("one", "walls.csv"), file("three", "walls.csv"));
+    EXPECT_EQ(file("one", "fields/grains_000002.vtp"), file("three", "fields/grains_000002.vtp"));
   }
 }
 

@@ -134,6 +134,65 @@ def test_a_vtkhdf_file_has_the_frames_to_the_bit(rain):
         assert not missing
 
 
+# Rods that fall, and two spheres that come in among them.
+RODS = {
+    "name": "rods", "gravity": [0, 0, -9.81], "time_step": 1e-3, "box": True, "allow_unconverged": True,
+    "material": {"density": 2600, "friction": 0.3},
+    "sample": {"kind": "lattice", "shape": "rod", "cells": [3, 2, 2], "spacing": 1, "radius": 0.02},
+    "insert": [{"name": "spheres", "radius": 0.004, "rate": 1000, "count": 2,
+                "region": {"shape": "box", "low": [0.06, 0.03, 0.03], "high": [0.14, 0.11, 0.11]}}],
+    "stage": [{"name": "fall", "end": {"steps": 80}}],
+    "output": {"every_steps": 40},
+}
+
+
+@pytest.fixture(scope="module")
+def rods(tmp_path_factory):
+    return talus.run(RODS, tmp_path_factory.mktemp("rods") / "run", threads=1, progress=False)
+
+
+def expect_rods(frame, ids, points, radii, velocities):
+    """Three balls in a row where a rod is, that touch and move as it turns; of a sphere itself."""
+    assert len(frame.ids) == 14 and len(ids) == 3 * 12 + 2
+    assert np.linalg.norm(frame.angular_velocities, axis=1).max() > 0.1
+    for k, grain in enumerate(frame.ids):
+        mine = np.flatnonzero(ids == grain)
+        at, own = points[mine] - frame.positions[k], radii[mine]
+        if grain >= 12:
+            assert np.array_equal(points[mine], frame.positions[[k]]) and np.array_equal(own, frame.radii[[k]])
+            continue
+        assert own == pytest.approx(np.full(3, frame.radii[k] / 3))
+        middle = int(np.argmin(np.linalg.norm(at, axis=1)))
+        ends = np.delete(at, middle, axis=0)
+        assert at[middle] == pytest.approx(np.zeros(3), abs=1e-12) and ends[0] == pytest.approx(-ends[1], abs=1e-12)
+        assert np.linalg.norm(ends[0]) == pytest.approx(2 * own[0])
+        assert velocities[mine] - frame.velocities[k] == pytest.approx(np.cross(frame.angular_velocities[k], at), abs=1e-12)
+    # Rods that were laid along one axis and fell: not all balls of theirs are where they began to be.
+    assert np.ptp(points[:, 2]) > 0
+
+
+def test_a_lammps_dump_has_the_balls_of_clumps(rods):
+    assert convert(rods.directory, "--to", "lammps").returncode == 0
+    head, atoms = read_dump(rods.directory / "grains.lammpstrj")[-1]
+    columns = lambda *names: np.stack([atoms[name] for name in names], -1)
+    expect_rods(rods.frame(-1), atoms["mol"] - 1, columns("x", "y", "z"), atoms["radius"], columns("vx", "vy", "vz"))
+    assert len(set(atoms["id"])) == len(atoms["id"]) == head["count"] and atoms["id"].min() == 1
+
+
+def test_a_vtkhdf_file_and_the_fields_have_the_balls_of_clumps(rods):
+    assert convert(rods.directory, "--to", "vtkhdf").returncode == 0
+    with h5py.File(rods.directory / "grains.vtkhdf") as file:
+        points, data = step_of(file["VTKHDF"], len(rods.frames) - 1)
+    expect_rods(rods.frame(-1), data["id"], points, data["radius"], data["velocity"])
+    vtp = sorted((rods.directory / "fields").glob("grains_*.vtp"))[-1]
+    assert f'NumberOfPoints="{len(points)}"' in vtp.read_text()
+    # Without the scene nobody knows the shapes: the spheres that hold the grains.
+    alone = rods.directory.parent / "alone.h5"
+    alone.write_bytes((rods.directory / "results.h5").read_bytes())
+    assert convert(alone, "--to", "lammps").returncode == 0
+    assert read_dump(rods.directory.parent / "grains.lammpstrj")[-1][0]["count"] == 14
+
+
 def test_what_cannot_be_converted_is_refused_and_nothing_is_replaced(rain, tmp_path):
     (tmp_path / "mine").write_text("mine")
     for words, message in [((rain.directory, "--to", "vtk"), "no format 'vtk': lammps or vtkhdf"),

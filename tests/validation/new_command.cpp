@@ -136,6 +136,10 @@ TEST(ViewCommand, DrawsOneFrameOrAllAndRefusesWhatThereIsNot) {
   EXPECT_EQ(run(scratch.path(), "view out --width 200 --force").code, 0);
   EXPECT_EQ(run(scratch.path(), "view out --force --colour taste").code, 2);
   EXPECT_EQ(run(scratch.path(), "view out --force --frame 99").code, 2);
+  const std::string slice = "view out --width 200 --colour velocity_y --slice x -o slice.svg";
+  EXPECT_EQ(run(scratch.path(), slice).code, 0);
+  EXPECT_NE(content(scratch / "slice.svg").find("velocity along y"), std::string::npos);
+  EXPECT_EQ(run(scratch.path(), "view out --force --slice w").code, 2);
   const Outcome movie = run(scratch.path(), "movie out --width 200 -o film", "env PATH=/nowhere");
   EXPECT_EQ(movie.code, 0) << movie.messages;
   EXPECT_NE(movie.messages.find("there is no ffmpeg"), std::string::npos) << movie.messages;

@@ -8,20 +8,23 @@ namespace {
 
 void add_common(CLI::App& app, ViewCommandOptions& options) {
   app.add_option("run", options.run, "directory of the results")->type_name("DIR")->required();
-  app.add_option("--colour", options.colour, "what grains are coloured by: speed, radius, force or material")
+  app.add_option("--colour", options.colour,
+                 "what grains are coloured by: speed, velocity_x, velocity_y, velocity_z, radius, force or "
+                 "material")
       ->type_name("WHAT")
       ->capture_default_str();
   app.add_option("--width", options.width, "of the image [px]")
       ->type_name("N")
       ->check(CLI::Range(64, 8192))
       ->capture_default_str();
-  app.add_option("--azimuth", options.azimuth, "where one looks from, degrees from x towards y")
+  app.add_option("--slice", options.slice,
+                 "x, y or z: only grains about the middle of this axis, four mean radii thick, seen along it")
+      ->type_name("AXIS");
+  app.add_option("--azimuth", options.azimuth, "where one looks from, degrees from x towards y [-60]")
+      ->type_name("DEG");
+  app.add_option("--elevation", options.elevation, "degrees above the plane of x and y [20]")
       ->type_name("DEG")
-      ->capture_default_str();
-  app.add_option("--elevation", options.elevation, "degrees above the plane of x and y")
-      ->type_name("DEG")
-      ->check(CLI::Range(-90, 90))
-      ->capture_default_str();
+      ->check(CLI::Range(-90, 90));
   app.add_flag("--force", options.force, "replace what is there");
 }
 
@@ -30,7 +33,9 @@ void add_view_options(CLI::App& app, ViewCommandOptions& options) {
   app.add_option("--frame", options.frame, "from 0; below 0 counted from the last")
       ->type_name("N")
       ->capture_default_str();
-  app.add_option("-o,--out", options.out, "file [view.png in the directory]")->type_name("FILE");
+  app.add_option("-o,--out", options.out,
+                 "file; its scale of colours comes along where it ends with .svg [view.png in the directory]")
+      ->type_name("FILE");
 }
 
 void add_movie_options(CLI::App& app, ViewCommandOptions& options) {

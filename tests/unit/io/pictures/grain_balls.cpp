@@ -1,6 +1,6 @@
 /// Clumps in pictures: as the balls that they are made of.
 
-#include "io/pictures/grain_balls.hpp"
+#include "io/results/grain_balls.hpp"
 
 #include <gtest/gtest.h>
 

@@ -98,6 +98,46 @@ TEST(View, ColoursAreBySpeedRadiusForceOrMaterial) {
   EXPECT_THROW(grain_colours().named("taste"), std::invalid_argument);
 }
 
+TEST(View, AComponentOfTheVelocityHasOneColourForEachWayAndNoneAtRest) {
+  Frame frame = grains({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
+  frame.u[0] = {7, -2, 0};
+  frame.u[2] = {7, 1, 0};
+  const GrainColour along_y = grain_colours().named("velocity_y").kind;
+  const std::vector<double> values = grain_values(frame, along_y);
+  EXPECT_EQ(values, (std::vector<double>{-2, 0, 1}));
+  EXPECT_EQ(grain_values(frame, GrainColour::velocity_x), (std::vector<double>{7, 0, 7}));
+  EXPECT_EQ(grain_values(frame, GrainColour::velocity_z), (std::vector<double>{0, 0, 0}));
+  const ColourRange range = colour_range(values, along_y);
+  EXPECT_EQ(range.low, -range.high);
+  EXPECT_GT(range.high, 0);
+  const auto back = colour_of(-1, range, along_y), ahead = colour_of(1, range, along_y),
+             rest = colour_of(0, range, along_y);
+  EXPECT_GT(back[2], back[0] + 0.2) << "blue";
+  EXPECT_GT(ahead[0], ahead[2] + 0.2) << "red";
+  EXPECT_NEAR(rest[0], rest[2], 0.01) << "grey";
+  EXPECT_EQ(colour_range(std::vector<double>(3, 0.0), along_y).low, -1) << "at rest there is a scale, too";
+}
+
+TEST(View, ASliceShowsOnlyGrainsAboutTheMiddleOfItsAxis) {
+  // Four mean radii are 0.4: of five grains along y the ones at -0.15, 0 and 0.15 are in it.
+  const Frame frame = grains({{0, -0.25, 0}, {1, -0.15, 0}, {2, 0, 0}, {3, 0.15, 0}, {4, 0.25, 0}});
+  ViewOptions options = from_front();
+  const auto is_there = [&](const Image& image, double x) {
+    const double scale = 0.92 * 200 / 4.2;
+    return pixel(image, static_cast<std::size_t>(100 + (x - 2) * scale), image.height / 2) !=
+           std::array<int, 3>{255, 255, 255};
+  };
+  const Image whole = render_view(frame, {}, {}, options);
+  options.slice = 1;
+  const Image slice = render_view(frame, {}, {}, options);
+  for (const double x : {0, 1, 2, 3, 4}) {
+    EXPECT_TRUE(is_there(whole, x)) << x;
+    EXPECT_EQ(is_there(slice, x), x > 0 && x < 4) << x;
+  }
+  EXPECT_NE(draw_view(frame, {}, options).find("a slice across y"), std::string::npos);
+  EXPECT_EQ(draw_view(grains({}), {}, options).find("nan"), std::string::npos);
+}
+
 TEST(View, TheScaleOfAFewThatMoveAmongGrainsAtRestIsTheirs) {
   std::vector<double> speeds(100, 0.0);
   EXPECT_EQ(colour_range(speeds, GrainColour::speed).high, 1);

@@ -113,6 +113,13 @@ TEST(Edges, AreThoseOfABoxAndNotOfAMantle) {
   const auto shown = wall_triangles(walls, std::vector<WallReport>(2), grain_bounds(one_grain()));
   EXPECT_EQ(edges_of(shown[0]).size(), 2u * 64u) << "both rims";
   EXPECT_EQ(edges_of(shown[1]).size(), 4u) << "not the diagonal";
+  EXPECT_TRUE(bends_of(shown[1]).empty());
+  // Of a tube one sees two lines along its axis from the side, and no more.
+  const auto outlines = [&](const Vec3& viewer) {
+    return std::ranges::count_if(bends_of(shown[0]), [&](const Bend& bend) { return bend.outlines(viewer); });
+  };
+  EXPECT_GE(bends_of(shown[0]).size(), 64u);
+  EXPECT_EQ(outlines(Vec3(0.31, 0.95, 0)), 2);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Grains of a frame as the spheres that a picture shows.
+/// Grains of a frame as the spheres that a picture or another program shows.
 
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "kernels/shapes/clump.hpp"
+#include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
 
 namespace talus::io {
@@ -25,6 +26,10 @@ struct GrainShapes {
 /// or cannot be read, all are drawn as the spheres that hold them. Else no file is read.
 GrainShapes grain_shapes(std::span<const Clump> clumps, bool inserts, const std::filesystem::path& results);
 
+/// The same on all ranks, of which rank 0 reads the file. Collective.
+GrainShapes grain_shapes(std::span<const Clump> clumps, bool inserts, const std::filesystem::path& results,
+                         const graph::Communicator& ranks);
+
 /// A sphere of a picture: a grain, or a ball of it.
 struct SeenBall {
   Vec3 centre = Vec3::Zero();  ///< [m]
@@ -38,5 +43,9 @@ void add_balls(const Frame& frame, const GrainShapes& shapes, std::size_t grain,
                std::vector<SeenBall>& balls);
 /// Those of all grains, in the order of the frame.
 std::vector<SeenBall> seen_balls(const Frame& frame, const GrainShapes& shapes);
+
+/// The same state with a body for each ball, for programs that know spheres only: id, angular velocity,
+/// orientation and material are those of its grain, the velocity is that of its own centre. Without contacts.
+Frame frame_of_balls(const Frame& frame, const GrainShapes& shapes);
 
 }  // namespace talus::io
