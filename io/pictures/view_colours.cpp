@@ -54,7 +54,7 @@ void draw_legend(detail::Svg& svg, const ViewOptions& options, const ColourRange
            detail::with_unit(range.high, grain_colours().of(options.colour).make) +
                (options.colour == GrainColour::radius ? "" : " and more"),
            {12, detail::style::ink, "middle"});
-  svg.text(left + width + 24, y + 10, std::string(grain_colours().of(options.colour).name),
+  svg.text(left + width + 24, y + 10, std::string(grain_colours().of(options.colour).sentence),
            {12, detail::style::soft_ink});
 }
 
