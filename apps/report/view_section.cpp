@@ -23,6 +23,7 @@ using nlohmann::json;
 
 constexpr std::size_t most_live = 20000;     ///< spheres that a browser turns smoothly
 constexpr std::size_t most_drawn = 1000000;  ///< that a report draws by itself
+constexpr std::size_t most_bends = 5000;     ///< of a wall: a finer mesh has no outline in the live view
 
 /// The newest frame; none where there is none, or it lacks what a view needs.
 std::optional<Frame> last_frame(const RunFolder& run) {
@@ -110,7 +111,9 @@ json live_data(const Frame& frame, const io::GrainShapes& shapes,
   };
   for (const std::vector<Triangle>& wall : walls) {
     for (const auto& ends : io::edges_of(wall)) lines.push_back(line_of(ends));
-    for (const io::Bend& bend : io::bends_of(wall)) {
+    const std::vector<io::Bend> round = io::bends_of(wall);
+    if (round.size() > most_bends) continue;
+    for (const io::Bend& bend : round) {
       json line = line_of(bend.ends);
       for (const Vec3& normal : bend.normals)
         for (int axis = 0; axis < 3; ++axis) line.push_back(std::round(1e4 * normal[axis]) / 1e4);
