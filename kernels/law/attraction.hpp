@@ -1,10 +1,11 @@
 #pragma once
 
 /// Laws by which bodies that touch hold one another: each is a force along the normal, c >= 0 [N], by which
-/// Signorini's condition and Coulomb's cone are shifted (kernels/sweeps/cohesion.hpp, which adds them up).
-/// One file in attractions/ for each.
+/// Signorini's condition and Coulomb's cone are shifted (kernels/sweeps/cohesion.hpp). Those of a pair add up
+/// (PairLaw::cohesion_of). One file in attractions/ for each.
 
 #include <array>
+#include <cmath>
 
 namespace talus {
 
@@ -12,7 +13,7 @@ namespace talus {
 struct TouchingRadii {
   double first, second;  ///< [m]
   /// l with 1/l = 1/R_1 + 1/R_2 [m].
-  double reduced() const { return 1 / (1 / first + 1 / second); }
+  double reduced() const { return std::isinf(second) ? first : first * second / (first + second); }
 };
 
 struct Attraction {

@@ -1,6 +1,7 @@
 #include "kernels/sweeps/rolling.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "kernels/bodies/index.hpp"
 #include "kernels/detection/materials.hpp"
@@ -56,9 +57,10 @@ void find_arms(const NarrowPhase& in, const Candidates& candidates, const Chunks
   for (std::size_t k = begin; k < end; ++k) {
     const PairLaw& law = law_at(in.laws, candidates, materials, at(contacts.candidate[k]));
     const double mu = law.friction > 0 ? law.rolling_resistance : 0;  // smooth contacts do not roll
-    const double a = in.radius[at(contacts.first[k])];
-    const double b = contacts.second[k] < 0 ? a : in.radius[at(contacts.second[k])];
-    contacts.arm[k] = mu * (contacts.second[k] < 0 ? a : a * b / (a + b));
+    const TouchingRadii radii{in.radius[at(contacts.first[k])], contacts.second[k] < 0
+                                                                    ? std::numeric_limits<double>::infinity()
+                                                                    : in.radius[at(contacts.second[k])]};
+    contacts.arm[k] = mu * radii.reduced();
   }
   if (contacts.spin.empty() || chunks.wall[chunk] < 0) return;
   const Wall& wall = in.walls[at(chunks.wall[chunk])];
