@@ -51,14 +51,22 @@ LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impuls
   return defect;
 }
 
-/// What the contacts do to the bodies: sum m |V(r) - V_free| [N s].
-double exchanged(const BodyProblem& problem) {
+/// What the contacts do to the bodies: V(r) - V_free [m/s].
+std::vector<Twist> exchanged(const BodyProblem& problem) {
   std::vector<Twist> change = velocities_of(problem, problem.impulse);
   for (std::size_t b = 0; b < change.size(); ++b) {
     change[b].u -= problem.bodies[b].free.u;
     change[b].w -= problem.bodies[b].free.w;
   }
-  return momentum_of(problem, change);
+  return change;
+}
+
+/// [J^(1/2)]
+double kinetic_norm(const BodyProblem& problem, const std::vector<Twist>& motion) {
+  double sum = 0;
+  for (std::size_t b = 0; b < motion.size(); ++b)
+    sum += kinetic2(problem.bodies[b], motion[b].u, motion[b].w);
+  return std::sqrt(sum);
 }
 
 /// Redundant contacts share forces by gaps that differ by no more than rounding, and by less than what the
@@ -67,14 +75,13 @@ double exchanged(const BodyProblem& problem) {
 /// also by the scale of what contacts do, beside which walls may press much harder.
 bool as_good(const BodyProblem& problem, const ClusterAnswer& answer, const LawDefect& defect,
              const ClusterGoal& goal, const ClusterThresholds& thresholds) {
-  const double apart = std::min(goal.enough, goal.relative * exchanged(problem));
-  return answer.solved && answer.error <= thresholds.same_velocities * apart &&
-         defect.worst <= thresholds.same_law * goal.relative * defect.largest;
-}
-
-bool has_friction(const BodyProblem& problem) {
-  return std::any_of(problem.contacts.begin(), problem.contacts.end(),
-                     [](const ContactEquation& c) { return c.mu > 0; });
+  if (!answer.solved || !(defect.worst <= thresholds.same_law * goal.relative * defect.largest)) return false;
+  const std::vector<Twist> done = exchanged(problem);
+  const double apart = std::min(goal.enough, goal.relative * momentum_of(problem, done));
+  const double norm =
+      goal.relative * std::max(kinetic_norm(problem, done), thresholds.pressed * defect.largest);
+  return answer.error <= thresholds.same_velocities * apart &&
+         (has_friction(problem) || kinetic_norm(problem, answer.motion) <= thresholds.same_velocities * norm);
 }
 
 /// Puts the changed impulses on the cones, and asks whether they are nearer to the law: by the residual, or

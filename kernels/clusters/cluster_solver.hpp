@@ -32,7 +32,9 @@ struct ClusterThresholds {
   /// velocities to this part of what need not be told apart, in (0, 1), and no contact is further from its
   /// law than by `same_law` of it, over the largest impulse, in (0, 1): they are an answer to gaps that
   /// differ by as little.
-  double same_velocities = 0.1, same_law = 1e-3;
+  /// Without friction velocities are compared in the kinetic norm, too, in which light bodies count beside
+  /// heavy ones, with what contacts exchange there, at least `pressed`, in (0, 1), of the largest impulse.
+  double same_velocities = 0.1, same_law = 1e-3, pressed = 1e-2;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.
   struct Handover {

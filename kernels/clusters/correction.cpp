@@ -24,6 +24,7 @@ struct ActiveSet {
   std::vector<Vec3> direction;  ///< of the impulse of those that slide, unit, on the edge of the cone
   std::vector<double> shift;    ///< mu |v_t| of the last velocities [m/s]
   std::vector<Vec3> change;     ///< of r: known, and the multiplier [N s]
+  std::vector<double> wrong;    ///< what the natural map found wrong last [N s]
 
   /// Known part of the change of r: all of it where open, across the direction where sliding.
   Vec3 known(const BodyProblem& problem, std::size_t k) const {
@@ -42,8 +43,9 @@ struct ActiveSet {
 
 ActiveSet empty_set(const BodyProblem& problem) {
   const std::size_t n = problem.contacts.size();
-  ActiveSet set{std::vector(n, ContactState::open), std::vector<Vec3>(n), std::vector(n, Vec3(Vec3::Zero())),
-                std::vector<double>(n, 0.0), std::vector(n, Vec3(Vec3::Zero()))};
+  ActiveSet set{std::vector(n, ContactState::open), std::vector<Vec3>(n),
+                std::vector(n, Vec3(Vec3::Zero())), std::vector<double>(n, 0.0),
+                std::vector(n, Vec3(Vec3::Zero())), std::vector<double>(n, 0.0)};
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
   for (std::size_t k = 0; k < n; ++k) {
     const ContactEquation& c = problem.contacts[k];
@@ -62,7 +64,8 @@ double see_states(const BodyProblem& problem, std::span<const Twist> motion, Act
     const Vec3 v = set.velocity[k] + constrained(c, relative_velocity(c, motion));
     const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
     set.shift[k] = shift;
-    wrong += (r - carried).norm();
+    set.wrong[k] = (r - carried).norm();
+    wrong += set.wrong[k];
     if (carried == Vec3::Zero()) {
       set.state[k] = ContactState::open;
     } else if (c.mu > 0 && carried == aim) {
@@ -112,6 +115,44 @@ double difference(const BodyProblem& problem, const std::vector<Twist>& a, const
   return momentum_of(problem, by);
 }
 
+/// The largest impulse with these changes [N s].
+double largest_impulse(const BodyProblem& problem, const std::vector<Vec3>& change) {
+  double largest = 0;
+  for (std::size_t k = 0; k < change.size(); ++k)
+    largest = larger(largest, (problem.impulse[k] + change[k]).norm());
+  return largest;
+}
+
+/// The largest difference of two changes of impulses [N s].
+double difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) most = larger(most, (a[k] - b[k]).norm());
+  return most;
+}
+
+/// Whether contacts stand where they stood `then`. Those that only rounding has moved go back there.
+bool stand(const BodyProblem& problem, const std::vector<ContactState>& then, double rounding,
+           ActiveSet& set) {
+  const double least = rounding * largest_impulse(problem, set.change);
+  bool same = true;
+  for (std::size_t k = 0; k < then.size(); ++k) {
+    if (set.state[k] == then[k]) continue;
+    if (set.wrong[k] > least)
+      same = false;
+    else
+      set.state[k] = then[k];
+  }
+  return same;
+}
+
+/// Where geometry amplifies, wishes that are missed by next to nothing may hide much of the motion; and where
+/// light bodies pass the force on between heavy ones, much of the forces behind next to no momentum.
+bool converged(const BodyProblem& problem, const Correction& now, double goal,
+               const CorrectionThresholds& thresholds) {
+  return now.updated <= larger(goal, now.left) &&
+         (has_friction(problem) || now.pushed <= thresholds.same_forces);
+}
+
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
 class Round {
  public:
@@ -132,8 +173,9 @@ class Round {
       const bool granted = take_multipliers(solution.motion, result);
       result.updated = difference(all_, solution.motion, motion);
       motion = std::move(solution.motion);
-      // Where geometry amplifies, wishes that are missed by next to nothing may hide much.
-      if (granted && result.updated <= goal_of(momentum_of(all_, motion), enough_, thresholds_)) break;
+      if (granted &&
+          converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_))
+        break;
     }
     return motion;
   }
@@ -157,6 +199,7 @@ class Round {
 
   /// s += rho (w - H^T d). True when the wishes are granted but for what is small.
   bool take_multipliers(const std::vector<Twist>& motion, Correction& result) {
+    const std::vector<Vec3> before = set_.change;
     for (std::size_t k = 0; k < all_.contacts.size(); ++k)
       if (set_.state[k] == ContactState::open) set_.change[k] = -all_.impulse[k];
     result.missed = 0;
@@ -167,6 +210,8 @@ class Round {
       set_.change[k] = multiplier(a) + firm_.rho(a) * rest + set_.known(all_, k);
       result.missed += effective_mass(active_.problem, c) * rest.norm();
     }
+    const double pushed = difference(before, set_.change);
+    result.pushed = pushed > 0 ? pushed / largest_impulse(all_, set_.change) : 0;
     return result.missed <= goal_of(momentum_of(all_, motion), enough_, thresholds_);
   }
 
@@ -199,6 +244,11 @@ Correction unchanged(const BodyProblem& problem, double at_first) {
 
 }  // namespace
 
+bool has_friction(const BodyProblem& problem) {
+  return std::any_of(problem.contacts.begin(), problem.contacts.end(),
+                     [](const ContactEquation& c) { return c.mu > 0; });
+}
+
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
   return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
 }
@@ -216,8 +266,7 @@ double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion)
 }
 
 Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds) {
-  const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
-                                    [](const ContactEquation& c) { return c.mu > 0; });
+  const bool friction = has_friction(problem);
   std::vector<Twist> motion(problem.bodies.size());
   ActiveSet set = empty_set(problem);
   const double wrong = see_states(problem, motion, set);
@@ -245,12 +294,12 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     now.open = see_states(problem, motion, set);
     now.moved = difference(problem, motion, before);
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
-    const bool stays = !friction && set.state == then;
-    if (apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && (friction || stays))
+    const bool stays = friction ? set.state == then : stand(problem, then, thresholds.rounding, set);
+    if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);
-    now.settled = now.open <= goal && now.updated <= goal && now.left <= enough &&
-                  (stays || (rounds > 1 && now.moved <= goal));
+    now.settled = now.open <= goal && now.left <= enough && converged(problem, now, goal, thresholds) &&
+                  (friction ? rounds > 1 && now.moved <= goal : stays);
     if (now.settled || now.error() < least) {
       least = now.error();
       best = std::move(now);

@@ -6,6 +6,7 @@
 
 #include <vector>
 
+#include "kernels/bodies/larger.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus {
@@ -23,6 +24,12 @@ struct CorrectionThresholds {
   /// Impulses that leave less than this part of what need not be known, in (0, 1], are exact: what
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
+  /// Without friction impulses are known where the last update of the multipliers has changed none by more
+  /// than this part of the largest, in (0, 1).
+  double same_forces = 1e-4;
+  /// And where no contact has changed its state for more than this part of the largest impulse, in (0, 1): so
+  /// much rounding makes.
+  double rounding = 1e-15;
   /// Not where all bodies of the cluster together are so many effective masses of a contact, >> 1: heavier
   /// ones go on where the firm contacts of a round give way, and contacts feel next to nothing of it.
   double most_apart = 1e7;
@@ -49,14 +56,15 @@ struct Correction {
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
   double updated = 0;         ///< likewise the last update of the multipliers
+  double pushed = 0;          ///< by which that has changed an impulse, over the largest impulse, at most
   int rounds = 0;
-  bool settled = false;  ///< no contact changed its state any more, or the one last round that did changed
-                         ///< next to nothing, and rounding leaves less than need not be known
+  bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
+                         ///< changed next to nothing; and rounding leaves less than need not be known
 
   /// All of it [N s].
   double error() const { return found + uncertain(); }
   /// What is not known of it [N s].
-  double uncertain() const { return missed + open + left + updated; }
+  double uncertain() const { return missed + open + larger(left, updated); }
 };
 
 /// The Newton step from the impulses of `problem`. `enough`: momentum [N s] below which an error need not be
@@ -71,13 +79,15 @@ struct Correction {
 /// is solved by augmented Lagrangians: (M + H rho H^T) d = k + H (rho w + s), s += rho (w - H^T d). Contacts
 /// whose impulse would pull then open, and open ones that d closes join, and it is solved again. When no
 /// contact changes any more, and without friction, V + d is the exact solution of the step, since it and r +
-/// change satisfy all its conditions. A contact that would change by next to nothing is given another round,
-/// and two rounds have to agree: a lattice whose contacts have tilted by 10^-5 amplifies what is wrong with
-/// one of them as much. With friction the direction of sliding is that of the last velocities: there two
-/// rounds have to agree in any case; where contacts carry more than they must, as in a jammed wedge, they may
-/// never do.
+/// change satisfy all its conditions. A contact that would change by next to nothing is given another round:
+/// in a lattice whose contacts lean by 10^-3 a closing speed of 10^-9 m/s decides who carries. With friction
+/// the direction of sliding is that of the last velocities: there two rounds have to agree in any case; where
+/// contacts carry more than they must, as in a jammed wedge, they may never do.
 Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
+
+/// Some contact has it.
+bool has_friction(const BodyProblem& problem);
 
 /// What may be left of a correction that has found so much momentum [N s].
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds);

@@ -18,6 +18,7 @@ void Certificate::begin(Scales scales) {
   corrected_from_ = std::numeric_limits<double>::infinity();
   corrected_at_ = -1;
   exchanged_by_small_ = {};
+  mends_ = false;
   asked_at_ = 0;
   asked_error_ = 0;
   work_at_ = -1;
@@ -65,21 +66,27 @@ Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, Whole
   const bool last = check.iterations >= settings_.max_iterations;
   result_.unbalance = result_.drift;
   result_.velocity_error = 0;
+  const bool stagnant = history_.stagnant(settings_.tolerance, thresholds_.patience, thresholds_.stagnation);
+  const bool gives_up = last || (stagnant && !check.other_ways);
   // Only a step that may end pays for an answer about the whole problem.
   const bool balance = (small || last) && balanced(whole);
   result_.converged = ((small && balance) || last) && even(whole) && small && balance;
+  if (gives_up && !small && !last && check.corrects && whole.small_clusters())
+    result_.unbalance = small_unbalance(whole);
 
   if (history_.first_since_start()) first_residual2_ = std::max(residual2_, scale2_);
   const double most = thresholds_.divergence * thresholds_.divergence * first_residual2_;
   result_.diverged = check.plain && residual2_ > most;
   if (result_.diverged) return Verdict::diverged;
-  const bool stagnant = !result_.converged &&
-                        history_.stagnant(settings_.tolerance, thresholds_.patience, thresholds_.stagnation);
-  result_.stagnated = stagnant && !check.other_ways;
+  result_.stagnated = false;
   if (result_.converged) return Verdict::solved;
   // A NaN fails every comparison above.
   if (std::isnan(result_.error_rms)) return Verdict::not_finite;
   if (result_.jammed) return Verdict::impossible;
+  // What sweeps do not get at, a direct solve may have found: small clusters are put right before a step is
+  // given up.
+  if (gives_up && check.corrects && mends_ && correctable()) return Verdict::go_on;
+  result_.stagnated = stagnant && !check.other_ways;
   if (last) return Verdict::exhausted;
   if (result_.stagnated) return Verdict::stagnated;
   return stagnant ? Verdict::stuck : Verdict::go_on;
@@ -171,6 +178,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
   return repeated(small_check_, small_tolerance(), [&](double enough) {
     const SmallError error = whole.small_error(enough, result_.iterations);
     exchanged_by_small_ = error.exchanged;
+    mends_ = error.mends;
     // Sweeps go on where others can still be put right.
     result_.jammed = error.jammed && !error.mends;
     if (!error.solved) {

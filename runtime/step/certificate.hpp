@@ -171,6 +171,7 @@ class Certificate {
     double seconds = 0;       ///< since the step's iterations began
     bool plain = true;        ///< sweeps are plain Gauss-Seidel
     bool other_ways = false;  ///< the method has another way when they stagnate
+    bool corrects = false;    ///< it puts small clusters right where their answers are known
   };
 
   /// `settings` is kept as a reference.
@@ -256,6 +257,7 @@ class Certificate {
   double by_work(WholeProblem& whole);
 
   WholeCheck small_check_, large_check_, quantile_check_;
+  bool mends_ = false;         ///< the last answer about small clusters can put some of them right
   double corrected_from_ = 0;  ///< error before small clusters were last put right in this step
   int corrected_at_ = -1;      ///< sweeps done then
   int asked_at_ = 0;           ///< sweeps done in this step when by_work last asked for a check of velocities

@@ -326,7 +326,8 @@ bool SolverLoop::judge() {
                                              {.iterations = schedule_.checked(),
                                               .seconds = measured_ - began_,
                                               .plain = now.kind == SweepKind::plain,
-                                              .other_ways = other.has_value()},
+                                              .other_ways = other.has_value(),
+                                              .corrects = method_->corrects()},
                                              problem_);
   if (verdict != Verdict::go_on && verdict != Verdict::stuck) return false;
   std::optional<SweepPlan> next;

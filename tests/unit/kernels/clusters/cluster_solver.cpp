@@ -43,8 +43,8 @@ TEST(ClusterSolver, ChangesForcesWhoseVelocitiesAreWrongByTheScaleOfWhatTheyDo) 
 
 /// Two grains of 1 kg, each on a plane that leans by the sine `lean`, under a lid that comes down with 1 N s
 /// and is heavy or light. A grain that carries P gives way by P lean^2. Grain b is `gap` [m/s] further from
-/// the lid, so that P_a - P_b = gap/lean^2. The impulses leave all to grain a.
-BodyProblem under_a_lid(double lean, double gap, double lid_mass) {
+/// the lid, so that P_a - P_b = gap/lean^2. The impulses leave all to grain a, and `excess` more.
+BodyProblem under_a_lid(double lean, double gap, double lid_mass, double excess) {
   BodyProblem problem;
   const Vec3 plane(lean, 0, std::sqrt(1 - lean * lean));
   for (std::int32_t k = 0; k < 2; ++k) {
@@ -60,25 +60,36 @@ BodyProblem under_a_lid(double lean, double gap, double lid_mass) {
   for (std::int32_t k = 0; k < 2; ++k) add_contact(problem, k, -1, plane, 0, 0);
   for (std::int32_t k = 0; k < 2; ++k) add_contact(problem, k, 2, -Vec3::UnitZ(), 0, 1);
   problem.contacts[3].offset = -gap * Vec3::UnitZ();
-  // A millionth too much: the lid goes up, and grain b is free.
-  const double carried = 1 + 1e-6;
+  const double carried = 1 + excess;
   problem.impulse[0] = carried * plane.z() * plane;
   problem.impulse[2] = -carried * Vec3::UnitZ();
   return problem;
 }
 
 TEST(ClusterSolver, FindsWhoCarriesWhereAllButTheSameVelocitiesMeetTheLawButForRounding) {
-  for (const double lid_mass : {0.01, 1.0})
-    for (const double lean : {1e-1, 1e-2, 1e-3, 3e-4}) {
-      const double apart = 0.5;
-      const BodyProblem problem = under_a_lid(lean, apart * lean * lean, lid_mass);
-      const ClusterAnswer answer = solve_cluster(problem, {.enough = 1e-5, .relative = 1e-5, .sweeps = 100});
-      ASSERT_TRUE(answer.solved) << lean;
-      const double a = -(problem.impulse[2] + answer.impulse[2]).z(),
-                   b = -(problem.impulse[3] + answer.impulse[3]).z();
-      EXPECT_NEAR(a - b, apart, 1e-3) << lean << ' ' << lid_mass;
-      EXPECT_NEAR(a + b, 1, 0.1 * lean) << lean << ' ' << lid_mass;
-    }
+  // With an excess the lid goes up, and grain b is free at first. Where contacts lean less than firm ones
+  // give way no answer is better than a wrong one.
+  int solved = 0;
+  for (const double lid_mass : {0.01, 1.0, 100.0})
+    for (const double excess : {0.0, 1e-6})
+      for (const double lean : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+        const double apart = 0.5;
+        const BodyProblem problem = under_a_lid(lean, apart * lean * lean, lid_mass, excess);
+        const ClusterAnswer answer =
+            solve_cluster(problem, {.enough = 1e-5, .relative = 1e-5, .sweeps = 100});
+        if (!answer.solved) continue;
+        ++solved;
+        const double a = -(problem.impulse[2] + answer.impulse[2]).z(),
+                     b = -(problem.impulse[3] + answer.impulse[3]).z();
+        // Velocities tell a grain that leans by less than this part of what is asked nothing of its force.
+        if (lean > 1e-5) {
+          EXPECT_NEAR(a - b, apart, 1e-3) << lean << ' ' << lid_mass << ' ' << excess;
+        }
+        const double give = lid_mass * lean * lean;  // of the lid, where all is on grain a
+        EXPECT_NEAR(a + b, (1 - give * apart / 2) / (1 + give / 2), 1e-5)
+            << lean << ' ' << lid_mass << ' ' << excess;
+      }
+  EXPECT_GE(solved, 24);
 }
 
 }  // namespace
