@@ -30,6 +30,19 @@ struct Conversion {
   io::GrainShapes shapes = {};  ///< spheres, unless the scene beside the results says otherwise
 };
 
+/// As the scene beside the results tells them; says where it cannot.
+void find_shapes(const fs::path& folder, Conversion& todo) {
+  const fs::path file = folder / "scene.resolved.toml";
+  if (!fs::exists(file)) return;
+  const char* why = "cannot be read";
+  if (const auto scene = resolved_scene(folder)) {
+    todo.shapes = io::grain_shapes(scene->setup.clumps, !scene->setup.inserts.empty(), todo.results);
+    if (scene->setup.clumps.empty() || todo.shapes.clump) return;
+    why = "inserts spheres among the clumps, which frames that do not begin with the run cannot tell apart";
+  }
+  print_error("talus: warning: {} {}; clumps become the spheres that hold them\n", file.string(), why);
+}
+
 Conversion conversion_of(const ConvertOptions& options) {
   if (options.format != "lammps" && options.format != "vtkhdf")
     throw std::invalid_argument(fmt::format("there is no format '{}': lammps or vtkhdf", options.format));
@@ -45,13 +58,7 @@ Conversion conversion_of(const ConvertOptions& options) {
   sources.push_back(todo.results);  // whatever its name
   io::check_output_files(sources, {todo.out}, options.force);
   todo.frames = io::demand_frames(todo.results);
-  const fs::path folder = fs::absolute(todo.results).parent_path();
-  if (const auto scene = resolved_scene(folder))
-    todo.shapes = io::grain_shapes(scene->setup.clumps, !scene->setup.inserts.empty(), todo.results);
-  else if (fs::exists(folder / "scene.resolved.toml"))
-    print_error(
-        "talus: warning: {} cannot be read; clumps, if there are any, become the spheres that hold them\n",
-        (folder / "scene.resolved.toml").string());
+  find_shapes(fs::absolute(todo.results).parent_path(), todo);
   return todo;
 }
 

@@ -90,13 +90,16 @@ class Viewed {
       const io::ColourRange colours = io::colour_range(values, view_.colour);
       box = first ? of_frame : Bounds{box.low.cwiseMin(of_frame.low), box.high.cwiseMax(of_frame.high)};
       first = false;
-      if (std::ranges::all_of(values, [](double value) { return value == 0; })) continue;
+      const bool shows = io::velocity_axis(view_.colour)
+                             ? std::ranges::any_of(values, [](double value) { return value != 0; })
+                             : std::ranges::max(values) > 0;
+      if (!shows) continue;
       range = range ? io::ColourRange{std::min(range->low, colours.low), std::max(range->high, colours.high)}
                     : colours;
     }
     if (first) return;
     view_.box = box;
-    view_.range = range.value_or(io::ColourRange{0, 1});
+    view_.range = range.value_or(io::colour_range(std::vector<double>{0}, view_.colour));
   }
 
   std::string image(std::size_t k) const {

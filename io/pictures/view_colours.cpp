@@ -49,7 +49,9 @@ void draw_legend(detail::Svg& svg, const ViewOptions& options, const ColourRange
         left + k * width / steps, y, width / steps + 0.3, 12,
         hex(colour_of(range.low + (k + 0.5) / steps * (range.high - range.low), range, options.colour)));
   svg.text(left, y + 28,
-           range.low == 0 ? "0" : detail::with_unit(range.low, grain_colours().of(options.colour).make));
+           range.low == 0 ? "0"
+                          : detail::with_unit(range.low, grain_colours().of(options.colour).make) +
+                                (velocity_axis(options.colour) ? " and less" : ""));
   svg.text(left + width, y + 28,
            detail::with_unit(range.high, grain_colours().of(options.colour).make) +
                (options.colour == GrainColour::radius ? "" : " and more"),
@@ -164,8 +166,9 @@ std::string draw_view(const Frame& frame, std::span<const Wall> walls, const Vie
                        detail::with_unit(frame.time, "s")),
            {18, detail::style::ink, "start", true});
   constexpr std::array<char, 3> axes{'x', 'y', 'z'};
-  const std::string cut =
-      options.slice ? fmt::format(", a slice across {}", axes[static_cast<std::size_t>(*options.slice)]) : "";
+  const std::string cut = options.slice ? fmt::format(", those in a slice across {} shown",
+                                                      axes[static_cast<std::size_t>(*options.slice)])
+                                        : "";
   svg.text(40, 54,
            fmt::format("{} grains{}, coloured by {}", frame.id.size(), cut,
                        grain_colours().of(options.colour).sentence),

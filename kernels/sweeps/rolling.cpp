@@ -6,6 +6,7 @@
 #include "kernels/bodies/index.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
+#include "kernels/law/attraction.hpp"
 #include "kernels/law/rolling_law.hpp"
 
 namespace talus {

@@ -36,10 +36,11 @@ inline void pause() noexcept {
 #endif
 }
 
-/// Polls before a thread that waits offers its core to others: some 30 to 100 microseconds, which is longer
-/// than a thread waits for a neighbour that has a core of its own. Where other programs want the cores, an
-/// offer is taken for milliseconds: with 128 polls two threads beside two other programs on two cores took 6
-/// times as long (60 steps of the demo, 12.4 s for 2.1).
+/// Polls before a thread that waits offers its core to others: some 100 microseconds of a Xeon (Sapphire
+/// Rapids), which is longer than a thread waits for a neighbour that has a core of its own. Where other
+/// programs want the cores, an offer is taken for milliseconds: with 128 polls two threads beside two other
+/// programs on two cores took 6 times as long (60 steps of the demo, 12.4 s for 2.1). Four threads on these
+/// cores took as long with either.
 inline constexpr int polls_before_yield = 2048;
 
 /// Pseudo-random spinning, to shake the order in which threads meet (test executors only). Mostly under a

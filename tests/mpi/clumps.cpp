@@ -35,6 +35,12 @@ pressure = 2000
 [solver]
 max_iterations = 60
 overlap_correction = 0.2
+[[insert]]
+name = "spheres"
+radius = 0.005
+rate = 500
+count = 3
+region = { shape = "box", low = [0.05, 0.05, 0.05], high = [0.2, 0.15, 0.2] }
 [decomposition]
 subdomains = 6
 repartition_every = 7

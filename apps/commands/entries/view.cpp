@@ -17,8 +17,10 @@ void add_common(CLI::App& app, ViewCommandOptions& options) {
       ->type_name("N")
       ->check(CLI::Range(64, 8192))
       ->capture_default_str();
-  app.add_option("--slice", options.slice,
-                 "x, y or z: only grains about the middle of this axis, four mean radii thick, seen along it")
+  app.add_option(
+         "--slice", options.slice,
+         "x, y or z: only grains about the middle of all centres of the frame along this axis, four mean "
+         "radii thick, seen along it")
       ->type_name("AXIS");
   app.add_option("--azimuth", options.azimuth, "where one looks from, degrees from x towards y [-60]")
       ->type_name("DEG");

@@ -134,7 +134,7 @@ TEST(View, ASliceShowsOnlyGrainsAboutTheMiddleOfItsAxis) {
     EXPECT_TRUE(is_there(whole, x)) << x;
     EXPECT_EQ(is_there(slice, x), x > 0 && x < 4) << x;
   }
-  EXPECT_NE(draw_view(frame, {}, options).find("a slice across y"), std::string::npos);
+  EXPECT_NE(draw_view(frame, {}, options).find("a slice across y shown"), std::string::npos);
   EXPECT_EQ(draw_view(grains({}), {}, options).find("nan"), std::string::npos);
 }
 

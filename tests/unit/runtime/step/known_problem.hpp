@@ -79,6 +79,7 @@ struct Situation {
   std::vector<double> small_errors = {};
   int newton_behind = -1;  ///< check behind which a Newton step is taken
   bool jammed = false, mends = false;
+  bool corrects = false;  ///< the method puts small clusters right
 };
 
 inline CheckSums sums_of(const Found& found, std::int64_t contacts) {
@@ -116,7 +117,8 @@ inline Outcome judged(const Situation& given, const CertificateThresholds& thres
                                         {.iterations = given.checks[k].iterations,
                                          .seconds = 0,
                                          .plain = given.plain,
-                                         .other_ways = given.other_ways},
+                                         .other_ways = given.other_ways,
+                                         .corrects = given.corrects},
                                         problem);
     if (static_cast<int>(k) == given.admm_behind) certificate.solved_by_admm({});
     if (static_cast<int>(k) == given.newton_behind) certificate.corrected();
