@@ -61,14 +61,6 @@ std::vector<Twist> exchanged(const BodyProblem& problem) {
   return change;
 }
 
-/// [J^(1/2)]
-double kinetic_norm(const BodyProblem& problem, const std::vector<Twist>& motion) {
-  double sum = 0;
-  for (std::size_t b = 0; b < motion.size(); ++b)
-    sum += kinetic2(problem.bodies[b], motion[b].u, motion[b].w);
-  return std::sqrt(sum);
-}
-
 /// Redundant contacts share forces by gaps that differ by no more than rounding, and by less than what the
 /// step before was certified to: an answer that shares them otherwise is none that is better. So impulses
 /// stay that meet the law themselves and give the velocities of the answer (ClusterThresholds::same_law),

@@ -109,27 +109,6 @@ ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
   return active;
 }
 
-double difference(const BodyProblem& problem, const std::vector<Twist>& a, const std::vector<Twist>& b) {
-  std::vector<Twist> by(a.size());
-  for (std::size_t k = 0; k < a.size(); ++k) by[k] = {a[k].u - b[k].u, a[k].w - b[k].w};
-  return momentum_of(problem, by);
-}
-
-/// The largest impulse with these changes [N s].
-double largest_impulse(const BodyProblem& problem, const std::vector<Vec3>& change) {
-  double largest = 0;
-  for (std::size_t k = 0; k < change.size(); ++k)
-    largest = larger(largest, (problem.impulse[k] + change[k]).norm());
-  return largest;
-}
-
-/// The largest difference of two changes of impulses [N s].
-double difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double most = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) most = larger(most, (a[k] - b[k]).norm());
-  return most;
-}
-
 /// Whether contacts stand where they stood `then`. Those that only rounding has moved go back there.
 bool stand(const BodyProblem& problem, const std::vector<ContactState>& then, double rounding,
            ActiveSet& set) {
@@ -150,7 +129,7 @@ bool stand(const BodyProblem& problem, const std::vector<ContactState>& then, do
 bool converged(const BodyProblem& problem, const Correction& now, double goal,
                const CorrectionThresholds& thresholds) {
   return now.updated <= larger(goal, now.left) &&
-         (has_friction(problem) || now.pushed <= thresholds.same_forces);
+         (has_friction(problem) || settled_forces(now, goal, thresholds.firmness, thresholds));
 }
 
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
@@ -171,7 +150,9 @@ class Round {
       FirmContacts::Solution solution = firm_.solve(force());
       result.left = momentum_of(all_, solution.last);
       const bool granted = take_multipliers(solution.motion, result);
-      result.updated = difference(all_, solution.motion, motion);
+      const std::vector<Twist> by = added(solution.motion, -1, motion);
+      result.updated = momentum_of(all_, by);
+      result.swayed = momentum_bound(all_, by);
       motion = std::move(solution.motion);
       if (granted &&
           converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_))
@@ -210,8 +191,7 @@ class Round {
       set_.change[k] = multiplier(a) + firm_.rho(a) * rest + set_.known(all_, k);
       result.missed += effective_mass(active_.problem, c) * rest.norm();
     }
-    const double pushed = difference(before, set_.change);
-    result.pushed = pushed > 0 ? pushed / largest_impulse(all_, set_.change) : 0;
+    result.pushed = pushed_by(all_, before, set_.change);
     return result.missed <= goal_of(momentum_of(all_, motion), enough_, thresholds_);
   }
 
@@ -225,10 +205,9 @@ class Round {
 
 /// All bodies together, over the least effective mass of a contact.
 double mass_ratio(const BodyProblem& problem) {
-  double all = 0, least = std::numeric_limits<double>::infinity();
-  for (const BodyUnknown& body : problem.bodies) all += body.mass;
+  double least = std::numeric_limits<double>::infinity();
   for (const ContactEquation& c : problem.contacts) least = std::min(least, effective_mass(problem, c));
-  return all / least;
+  return mass_of_all(problem) / least;
 }
 
 /// Of impulses that are an answer themselves.
@@ -249,6 +228,25 @@ bool has_friction(const BodyProblem& problem) {
                      [](const ContactEquation& c) { return c.mu > 0; });
 }
 
+double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change) {
+  double largest = 0;
+  for (std::size_t k = 0; k < change.size(); ++k)
+    largest = larger(largest, (problem.impulse[k] + change[k]).norm());
+  return largest;
+}
+
+double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::span<const Vec3> now) {
+  double most = 0;
+  for (std::size_t k = 0; k < now.size(); ++k) most = larger(most, (now[k] - before[k]).norm());
+  return most > 0 ? most / largest_impulse(problem, now) : 0;
+}
+
+bool settled_forces(const Correction& now, double goal, double firmness,
+                    const CorrectionThresholds& thresholds) {
+  return now.pushed * thresholds.firmness <= thresholds.same_forces * firmness ||
+         now.swayed <= now.pushed * goal;
+}
+
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
   return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
 }
@@ -256,13 +254,6 @@ double goal_of(double found, double enough, const CorrectionThresholds& threshol
 double rest_of(double before, double now, double rounding) {
   if (now <= rounding) return now;
   return now < before ? now * now / (before - now) : std::numeric_limits<double>::infinity();
-}
-
-double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion) {
-  double sum = 0;
-  for (std::size_t b = 0; b < motion.size(); ++b)
-    sum += problem.bodies[b].mass * motion[b].u.norm() + problem.bodies[b].spin_mass * motion[b].w.norm();
-  return sum;
 }
 
 Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds) {
@@ -292,7 +283,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     now.found = momentum_of(problem, motion);
     const std::vector<ContactState> then = set.state;
     now.open = see_states(problem, motion, set);
-    now.moved = difference(problem, motion, before);
+    now.moved = momentum_of(problem, added(motion, -1, before));
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
     const bool stays = friction ? set.state == then : stand(problem, then, thresholds.rounding, set);
     if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)

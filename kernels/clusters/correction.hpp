@@ -4,9 +4,11 @@
 /// all its bodies, by linear solves that see through chains where sweeps do not
 /// (docs/decisions/0024-certificate.md).
 
+#include <span>
 #include <vector>
 
 #include "kernels/bodies/larger.hpp"
+#include "kernels/clusters/motion_norms.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus {
@@ -25,7 +27,9 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
   /// Without friction impulses are known where the last update of the multipliers has changed none by more
-  /// than this part of the largest, in (0, 1).
+  /// than this part of the largest, in (0, 1). Where contacts are redundant they may creep on for ever: then
+  /// velocities are known where such updates, until they have changed an impulse by the largest, would not
+  /// change these by what need not be known.
   double same_forces = 1e-4;
   /// And where no contact has changed its state for more than this part of the largest impulse, in (0, 1): so
   /// much rounding makes.
@@ -56,6 +60,7 @@ struct Correction {
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
   double updated = 0;         ///< likewise the last update of the multipliers
+  double swayed = 0;          ///< as much momentum as that may have in light bodies (momentum_bound)
   double pushed = 0;          ///< by which that has changed an impulse, over the largest impulse, at most
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
@@ -89,6 +94,12 @@ Correction correction_of(const BodyProblem& problem, double enough,
 /// Some contact has it.
 bool has_friction(const BodyProblem& problem);
 
+/// The largest impulse of the problem with these changes [N s].
+double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change);
+
+/// By which the changes of impulses differ from those `before`, over the largest impulse, at most.
+double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::span<const Vec3> now);
+
 /// What may be left of a correction that has found so much momentum [N s].
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds);
 
@@ -96,7 +107,10 @@ double goal_of(double found, double enough, const CorrectionThresholds& threshol
 /// geometric series. What is within `rounding` tells nothing of its ratio [all N s].
 double rest_of(double before, double now, double rounding);
 
-/// Sum m |u| + (I/R^2) |w| over the unknowns [N s].
-double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion);
+/// Forces are known, or creep on without moving the bodies (CorrectionThresholds::same_forces), by the last
+/// update of a correction. `goal` [N s]: what may be left; `firmness`: rho W_nn of the update. In directions
+/// that W hardly resists impulses creep the further the firmer it is, so that a softer one shows less.
+bool settled_forces(const Correction& now, double goal, double firmness,
+                    const CorrectionThresholds& thresholds);
 
 }  // namespace talus

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "kernels/clusters/firm_contacts.hpp"
+#include "kernels/clusters/motion_norms.hpp"
 #include "kernels/global/stiffness.hpp"
 #include "kernels/law/friction_cone.hpp"
 
@@ -63,15 +64,6 @@ void go_along(const std::vector<Twist>& way, const MinimumThresholds& newton, Pr
 }
 
 }  // namespace
-
-std::vector<Twist> added(const std::vector<Twist>& a, double part, const std::vector<Twist>& b) {
-  std::vector<Twist> sum(a);
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    sum[k].u += part * b[k].u;
-    sum[k].w += part * b[k].w;
-  }
-  return sum;
-}
 
 ProximalStep::ProximalStep(const BodyProblem& problem, double firmness)
     : firmness(firmness), centre(problem.impulse), motion(problem.bodies.size()), problem_(problem) {

@@ -70,7 +70,4 @@ struct Minimised {
 /// leaves. `work`: multiplications after which no more factorisations begin, in; what is left of them, out.
 Minimised minimise(const StepGoal& goal, const MinimumThresholds& newton, ProximalStep& step, double& work);
 
-/// a + part b, per unknown.
-std::vector<Twist> added(const std::vector<Twist>& a, double part, const std::vector<Twist>& b);
-
 }  // namespace talus

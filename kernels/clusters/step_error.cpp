@@ -156,10 +156,7 @@ class Answers {
     return scales_[c] > 0 ? momentum / scales_[c] : std::numeric_limits<double>::infinity();
   }
   double largest_impulse(std::size_t c) const {
-    double most = 0;
-    for (std::size_t k = 0; k < answers_[c].found.size(); ++k)
-      most = larger(most, (clusters_[c].problem.impulse[k] + answers_[c].found[k]).norm());
-    return most;
+    return talus::largest_impulse(clusters_[c].problem, answers_[c].found);
   }
   /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times
   /// that of all, or of what the cluster's bodies exchange.

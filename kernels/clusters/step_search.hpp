@@ -54,7 +54,9 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
   best.impulse.assign(problem.contacts.size(), Vec3::Zero());
   best.motion.resize(problem.bodies.size());
   best.open = std::numeric_limits<double>::infinity();
+  const bool friction = has_friction(problem);
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
+  std::vector<Vec3> impulse = best.impulse;
   int wary = 0;
   for (int k = 1; k <= search.most_steps && work > 0 && !best.settled; ++k) {
     const std::vector<Twist> before = steps.motion();
@@ -67,12 +69,17 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
     }
     Correction now = steps.take();
     now.rounds = k;
-    now.moved = momentum_of(problem, added(now.motion, -1, before));
+    const std::vector<Twist> by = added(now.motion, -1, before);
+    now.moved = momentum_of(problem, by);
+    now.swayed = momentum_bound(problem, by);
     const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
     // Behind a firmer step a softer one changes less, which says nothing.
     const bool comparable = small && firmness >= last;
     now.missed = comparable ? rest_of(moved, now.moved, search.inner * goal) : now.moved;
-    now.settled = comparable && firmness >= search.firm_enough && now.missed <= search.rest * goal;
+    now.pushed = pushed_by(problem, impulse, now.impulse);
+    const bool known = friction || settled_forces(now, goal, firmness, thresholds);
+    now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
+    impulse = now.impulse;
     moved = now.moved;
     last = firmness;
     if (wary > 0)

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/unit/kernels/clusters/cluster_makers.hpp"
@@ -45,6 +46,24 @@ TEST(ProximalSteps, LeaveRedundantContactsTheSharesThatTheyHave) {
     EXPECT_NEAR(impulse_of(problem, answer, 0).z(), (share + 0.05) * fall, 1e-3 * fall) << share;
     EXPECT_NEAR(impulse_of(problem, answer, 1).z(), (0.95 - share) * fall, 1e-3 * fall) << share;
   }
+}
+
+TEST(ProximalSteps, FindWhoCarriesALidWhereOnlyFirmStepsSeeIt) {
+  // W resists a change of the shares by lean^2: a step of firmness 10^6 takes no more than a thousandth of
+  // what is left where contacts lean least, moves the bodies by less than need be known, and is no answer.
+  const double apart = 0.5;
+  for (const double lid_mass : {1.0, 1e4, 1e7})
+    for (const double lean : {1e-1, 1e-2, 1e-3, 1e-4, 3e-5}) {
+      const BodyProblem problem = under_a_lid(lean, apart * lean * lean, lid_mass, 0);
+      double work = 1e9;
+      const Correction answer = proximal_correction(problem, 2e-4, {}, {}, work);
+      ASSERT_TRUE(answer.settled) << lean << ' ' << lid_mass;
+      const double a = -impulse_of(problem, answer, 2).z(), b = -impulse_of(problem, answer, 3).z();
+      const double give = lid_mass * lean * lean;  // of the lid, where all is on grain a
+      const double one = 1 / (1 + give), both = (1 - give * apart / 2) / (1 + give / 2);
+      EXPECT_NEAR(a - b, std::min(one, apart), 1e-2) << lean << ' ' << lid_mass;
+      EXPECT_NEAR(a + b, one < apart ? one : both, 2e-4) << lean << ' ' << lid_mass;
+    }
 }
 
 TEST(ProximalSteps, KeepToTheirWorkAndSaySo) {
