@@ -9,6 +9,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "io/pictures/detail/slab.hpp"
 #include "io/results/wall_triangles.hpp"
 
 namespace talus::io {
@@ -278,8 +279,8 @@ std::vector<SeenBall> shown_balls(const Frame& frame, const ViewOptions& options
   const auto place = [&](const Vec3& x) { return x[*options.slice]; };
   double low = infinity, high = -infinity;
   for (const Vec3& x : frame.x) low = std::min(low, place(x)), high = std::max(high, place(x));
-  const double half = 2 * std::accumulate(frame.radius.begin(), frame.radius.end(), 0.0) /
-                      static_cast<double>(frame.radius.size());
+  const double radii = std::accumulate(frame.radius.begin(), frame.radius.end(), 0.0),
+               half = detail::half_of_slab(0, radii / static_cast<double>(frame.radius.size()));
   std::erase_if(balls, [&](const SeenBall& ball) {
     return std::abs(place(frame.x[ball.grain]) - (low + high) / 2) > half;
   });

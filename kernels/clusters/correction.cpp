@@ -129,7 +129,7 @@ bool stand(const BodyProblem& problem, const std::vector<ContactState>& then, do
 bool converged(const BodyProblem& problem, const Correction& now, double goal,
                const CorrectionThresholds& thresholds) {
   return now.updated <= larger(goal, now.left) &&
-         (has_friction(problem) || settled_forces(now, goal, thresholds.firmness, thresholds));
+         (has_friction(problem) || now.pushed <= thresholds.same_forces);
 }
 
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
@@ -150,9 +150,7 @@ class Round {
       FirmContacts::Solution solution = firm_.solve(force());
       result.left = momentum_of(all_, solution.last);
       const bool granted = take_multipliers(solution.motion, result);
-      const std::vector<Twist> by = added(solution.motion, -1, motion);
-      result.updated = momentum_of(all_, by);
-      result.swayed = momentum_bound(all_, by);
+      result.updated = momentum_of(all_, added(solution.motion, -1, motion));
       motion = std::move(solution.motion);
       if (granted &&
           converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_))
@@ -205,9 +203,10 @@ class Round {
 
 /// All bodies together, over the least effective mass of a contact.
 double mass_ratio(const BodyProblem& problem) {
-  double least = std::numeric_limits<double>::infinity();
+  double all = 0, least = std::numeric_limits<double>::infinity();
+  for (const BodyUnknown& body : problem.bodies) all += body.mass;
   for (const ContactEquation& c : problem.contacts) least = std::min(least, effective_mass(problem, c));
-  return mass_of_all(problem) / least;
+  return all / least;
 }
 
 /// Of impulses that are an answer themselves.
@@ -239,12 +238,6 @@ double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::
   double most = 0;
   for (std::size_t k = 0; k < now.size(); ++k) most = larger(most, (now[k] - before[k]).norm());
   return most > 0 ? most / largest_impulse(problem, now) : 0;
-}
-
-bool settled_forces(const Correction& now, double goal, double firmness,
-                    const CorrectionThresholds& thresholds) {
-  return now.pushed * thresholds.firmness <= thresholds.same_forces * firmness ||
-         now.swayed <= now.pushed * goal;
 }
 
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {

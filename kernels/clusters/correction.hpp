@@ -27,9 +27,7 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
   /// Without friction impulses are known where the last update of the multipliers has changed none by more
-  /// than this part of the largest, in (0, 1). Where contacts are redundant they may creep on for ever: then
-  /// velocities are known where such updates, until they have changed an impulse by the largest, would not
-  /// change these by what need not be known.
+  /// than this part of the largest, in (0, 1).
   double same_forces = 1e-4;
   /// And where no contact has changed its state for more than this part of the largest impulse, in (0, 1): so
   /// much rounding makes.
@@ -60,7 +58,6 @@ struct Correction {
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
   double updated = 0;         ///< likewise the last update of the multipliers
-  double swayed = 0;          ///< as much momentum as that may have in light bodies (momentum_bound)
   double pushed = 0;          ///< by which that has changed an impulse, over the largest impulse, at most
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
@@ -106,11 +103,5 @@ double goal_of(double found, double enough, const CorrectionThresholds& threshol
 /// What is still to come of proximal steps that have changed the motion by `before` and by `now` at last: a
 /// geometric series. What is within `rounding` tells nothing of its ratio [all N s].
 double rest_of(double before, double now, double rounding);
-
-/// Forces are known, or creep on without moving the bodies (CorrectionThresholds::same_forces), by the last
-/// update of a correction. `goal` [N s]: what may be left; `firmness`: rho W_nn of the update. In directions
-/// that W hardly resists impulses creep the further the firmer it is, so that a softer one shows less.
-bool settled_forces(const Correction& now, double goal, double firmness,
-                    const CorrectionThresholds& thresholds);
 
 }  // namespace talus

@@ -28,14 +28,4 @@ double kinetic_norm(const BodyProblem& problem, const std::vector<Twist>& motion
   return std::sqrt(sum);
 }
 
-double mass_of_all(const BodyProblem& problem) {
-  double all = 0;
-  for (const BodyUnknown& body : problem.bodies) all += body.mass;
-  return all;
-}
-
-double momentum_bound(const BodyProblem& problem, const std::vector<Twist>& motion) {
-  return std::sqrt(mass_of_all(problem)) * kinetic_norm(problem, motion);
-}
-
 }  // namespace talus

@@ -17,11 +17,4 @@ double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion)
 /// |motion|_M [J^(1/2)].
 double kinetic_norm(const BodyProblem& problem, const std::vector<Twist>& motion);
 
-/// Sum m of the unknowns [kg].
-double mass_of_all(const BodyProblem& problem);
-
-/// The largest momentum with the energy of this motion [N s]: (sum m)^(1/2) |motion|_M, by Cauchy and
-/// Schwarz. What light bodies do beside heavy ones shows in it, and hardly in their momentum.
-double momentum_bound(const BodyProblem& problem, const std::vector<Twist>& motion);
-
 }  // namespace talus

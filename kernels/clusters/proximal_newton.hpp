@@ -17,6 +17,11 @@ struct ProximalThresholds {
   /// As long as steps move by more than `far` goals, > 1, a minimum need not be known better than to this
   /// part of what the last step has moved, in (0, 1).
   double far = 100, loose = 0.1;
+  /// Leaps of the impulses at most, >= 0. Each may double the largest one.
+  int most_leaps = 40;
+  /// Normal velocities of contacts that carry, over the fastest velocity there is, in (0, 1): less of it is
+  /// rounding, and says nothing of who carries.
+  double rounding = 1e-12;
 };
 
 /// What would set all contacts right, as correction_of. `work`: multiplications after which no more

@@ -47,6 +47,13 @@ struct StepStart {
 ///                                          step goes on from there
 ///   bool firmer(bool small) const          whether the next one may be firmer; `small`: what is left of this
 ///                                          one is within the goal
+///
+/// and may have
+///
+///   std::vector<Vec3> leap(double& work)   goes on as the last step has changed the impulses, where only
+///   they
+///                                          still change; returns their change since those of the problem
+///   bool at_rest() const                   what changes the impulses yet is rounding
 template <class Steps>
 Correction search_by_steps(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds,
                            const SearchThresholds& search, Steps& steps, double& work) {
@@ -69,17 +76,19 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
     }
     Correction now = steps.take();
     now.rounds = k;
-    const std::vector<Twist> by = added(now.motion, -1, before);
-    now.moved = momentum_of(problem, by);
-    now.swayed = momentum_bound(problem, by);
+    now.moved = momentum_of(problem, added(now.motion, -1, before));
     const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
     // Behind a firmer step a softer one changes less, which says nothing.
     const bool comparable = small && firmness >= last;
     now.missed = comparable ? rest_of(moved, now.moved, search.inner * goal) : now.moved;
     now.pushed = pushed_by(problem, impulse, now.impulse);
-    const bool known = friction || settled_forces(now, goal, firmness, thresholds);
+    // In directions that W hardly resists impulses creep the further the firmer a step is.
+    bool known = friction || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
+    if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
     impulse = now.impulse;
+    if constexpr (requires { steps.leap(work); })
+      if (small && !known) impulse = steps.leap(work);
     moved = now.moved;
     last = firmness;
     if (wary > 0)

@@ -72,6 +72,25 @@ TEST_F(StiffRanks, CarryAHeavyPlateWithTheSameBitsOnAnyRanksAndThreads) {
   }
 }
 
+// The sweeps have run out when the column, which lies in all subdomains, is solved on its own.
+TEST_F(StiffRanks, PutAColumnRightBehindTheLastSweepWithTheSameBitsOnAnyRanks) {
+  grains(1, 60);
+  scene("");
+  const std::string keys =
+      "run scene.toml --force --set solver.max_iterations=20 --set solver.tolerance=1e-6 --threads 1";
+  ASSERT_EQ(run(1, keys + " --out plain --set solver.method=nlgs").code, 3)
+      << "the scene is to need more sweeps than it has";
+  const Outcome one = run(1, keys + " --out one");
+  ASSERT_EQ(one.code, 0) << one.messages;
+  for (const int ranks : {2, 3}) {
+    const Outcome several = run(ranks, keys + " --out several");
+    ASSERT_EQ(several.code, 0) << several.messages;
+    EXPECT_EQ(digest_of("several"), digest_of("one")) << ranks;
+    EXPECT_EQ(without(file("several", "steps.csv"), "wall_s"), without(file("one", "steps.csv"), "wall_s"))
+        << ranks;
+  }
+}
+
 // Checks as close as they may be, all courses and couplings: what a rank does before it hears of a check is
 // undone.
 TEST_F(StiffRanks, DropTheSweepThatHidTheSumsThatCalledAdmm) {

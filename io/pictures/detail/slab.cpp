@@ -17,7 +17,7 @@ Slab empty_slab(const SampleExtent& sample, double thickness) {
   slab.sample = sample;
   if (sample.grains == 0) return slab;
   slab.middle = (sample.y_low + sample.y_high) / 2;
-  slab.half = thickness > 0 ? thickness / 2 : 2 * sample.mean_radius;
+  slab.half = half_of_slab(thickness, sample.mean_radius);
   return slab;
 }
 

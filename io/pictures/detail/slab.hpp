@@ -22,6 +22,11 @@ struct Slab {
   bool holds(const Vec3& centre) const { return std::abs(centre.y() - middle) <= half; }
 };
 
+/// Half of a slab's thickness [m]; 0: that of four mean radii.
+inline double half_of_slab(double thickness, double mean_radius) {
+  return thickness > 0 ? thickness / 2 : 2 * mean_radius;
+}
+
 /// `thickness` [m]; 0: four mean radii. Without grains an empty slab. `sample`: as in ForcePicture.
 Slab cut_slab(const Frame& frame, double thickness, const std::optional<SampleExtent>& sample = {});
 /// The same without grains.
