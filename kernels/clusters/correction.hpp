@@ -27,7 +27,8 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
   /// Without friction impulses are known where the last update of the multipliers has changed none by more
-  /// than this part of the largest, in (0, 1).
+  /// than this part of the largest, in (0, 1); and where a proximal step of this firmness would change none
+  /// by more.
   double same_forces = 1e-4;
   /// And where no contact has changed its state for more than this part of the largest impulse, in (0, 1): so
   /// much rounding makes.
@@ -58,10 +59,12 @@ struct Correction {
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
   double updated = 0;         ///< likewise the last update of the multipliers
-  double pushed = 0;          ///< by which that has changed an impulse, over the largest impulse, at most
+  double pushed = 0;          ///< by which that, or the last proximal step, has changed an impulse, over the
+                              ///< largest impulse, at most
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
-                         ///< changed next to nothing; and rounding leaves less than need not be known
+                         ///< changed next to nothing; and rounding leaves less than need not be known. Of
+                         ///< proximal steps: further ones would change next to nothing
 
   /// All of it [N s].
   double error() const { return found + uncertain(); }

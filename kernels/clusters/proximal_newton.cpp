@@ -19,14 +19,15 @@ class ProximalSteps {
  public:
   ProximalSteps(const BodyProblem& problem, const ProximalThresholds& thresholds)
       : problem_(problem), thresholds_(thresholds), step_(problem, thresholds.search.first_firmness) {
-    for (const BodyUnknown& body : problem.bodies) fastest_ = larger(fastest_, body.free.u.norm());
-    for (const ContactEquation& c : problem.contacts) fastest_ = larger(fastest_, c.offset.norm());
+    for (const BodyUnknown& body : problem.bodies)
+      fastest_ = larger(fastest_, larger(body.free.u.norm(), body.free.w.norm()));
   }
 
   const std::vector<Twist>& motion() const { return step_.motion; }
 
   bool solve(const StepStart& start, double& work) {
     began_ = step_.motion;
+    began_balanced_ = std::exchange(balanced_, false);
     step_.firmness = start.firmness;
     const double far = start.moved > thresholds_.far * start.goal ? thresholds_.loose * start.moved : 0;
     const StepGoal goal{std::max(thresholds_.search.inner * start.goal, far), std::max(start.goal, far)};
@@ -40,18 +41,24 @@ class ProximalSteps {
     Correction now;
     before_ = step_.centre;
     closing_ = 0;
+    asked_ = 0;
+    double largest = 0;
     for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
       const Vec3 r = step_.carried(k, step_.motion);
       const NaturalMap map =
           natural_map_of(problem_, problem_.contacts[k], r, step_.velocity(k, step_.motion));
       now.open += (r - map.carried).norm();
-      if (r != Vec3::Zero())
-        closing_ =
-            larger(closing_, std::abs(problem_.contacts[k].normal.dot(step_.velocity(k, step_.motion))));
+      if (r != Vec3::Zero()) {
+        const ContactEquation& c = problem_.contacts[k];
+        closing_ = larger(closing_, std::abs(c.normal.dot(step_.velocity(k, step_.motion))));
+        asked_ = larger(asked_, std::abs(c.normal.dot(c.offset)));
+      }
+      largest = larger(largest, r.norm());
       now.impulse.push_back(r - problem_.impulse[k]);
       step_.centre[k] = r;
       step_.shift[k] = map.shift;
     }
+    if (first_largest_ == 0) first_largest_ = largest;
     now.motion = step_.motion;
     now.found = momentum_of(problem_, step_.motion);
     now.left = minimum_.off;
@@ -59,29 +66,46 @@ class ProximalSteps {
   }
 
   /// Without friction: what pushes the forces on is rounding of the gaps.
-  bool at_rest() const { return closing_ <= thresholds_.rounding * fastest_; }
+  bool at_rest() const { return closing_ <= thresholds_.rounding * larger(fastest_, asked_); }
 
   /// Without friction: along the last change of the impulses to where the dual objective 1/2 |V(r)|_M^2 +
   /// r.offset is least, until a contact opens, or one has changed by the largest. In directions that W hardly
-  /// resists single steps, even firm ones, creep.
-  std::vector<Vec3> leap(double& work) {
+  /// resists single steps, even firm ones, creep. Returns how many times the last change that is.
+  double leap(double& work) {
+    if (leaps_ >= thresholds_.most_leaps) return 0;
     // The last step to the end: what its momentum is off by would show in the impulses.
-    step_.centre = before_;
-    minimise({0, std::numeric_limits<double>::infinity()}, thresholds_.newton, step_, work);
+    const std::vector<Vec3> to = std::exchange(step_.centre, before_);
+    const std::vector<Twist> motion = step_.motion;
+    const Minimised end =
+        minimise({0, std::numeric_limits<double>::infinity()}, thresholds_.newton, step_, work);
+    if (!(end.off <= minimum_.off)) {
+      step_.centre = to;
+      step_.motion = motion;
+      return 0;
+    }
     std::vector<Vec3> carried;
     for (std::size_t k = 0; k < before_.size(); ++k) carried.push_back(step_.carried(k, step_.motion));
     step_.centre = std::move(carried);
+    balanced_ = true;
+    // From a motion that does not belong to its centres no direction can be told.
+    if (!began_balanced_) return 0;
     const std::vector<Twist> by = added(step_.motion, -1, began_);
-    const double part = leaps_++ < thresholds_.most_leaps ? length_of_leap(by) : 0;
+    const double part = length_of_leap(by);
+    if (part >= 1) ++leaps_;
     step_.motion = added(step_.motion, part, by);
-    std::vector<Vec3> impulse;
     for (std::size_t k = 0; k < step_.centre.size(); ++k) {
       const ContactEquation& c = problem_.contacts[k];
       step_.centre[k] =
           project_on_cone(step_.centre[k] + part * (step_.centre[k] - before_[k]), c.normal, c.mu);
-      impulse.push_back(step_.centre[k] - problem_.impulse[k]);
     }
-    return impulse;
+    return part;
+  }
+  /// Of the impulses since those of the problem.
+  std::vector<Vec3> changes() const {
+    std::vector<Vec3> change;
+    for (std::size_t k = 0; k < step_.centre.size(); ++k)
+      change.push_back(step_.centre[k] - problem_.impulse[k]);
+    return change;
   }
 
   bool firmer(bool) const { return minimum_.factorisations <= thresholds_.easy; }
@@ -97,21 +121,28 @@ class ProximalSteps {
       largest = larger(largest, step_.centre[k].norm());
       change = larger(change, last.norm());
       const double closing = -c.normal.dot(last);
-      if (closing > 0) opens = std::min(opens, c.normal.dot(step_.centre[k]) / closing);
+      if (closing > 0 && step_.centre[k] != Vec3::Zero())
+        opens = std::min(opens, c.normal.dot(step_.centre[k]) / closing);
     }
     const double norm = kinetic_norm(problem_, by);
     const double least = norm > 0 ? -slope / (norm * norm) : std::numeric_limits<double>::infinity();
-    return slope < 0 && change > 0 ? std::min({least, opens, largest / change}) : 0;
+    // Forces without bound are none: walls press on what cannot get away.
+    const bool bounded = largest <= thresholds_.most_growth * first_largest_;
+    return bounded && slope < 0 && change > 0 ? std::min({least, opens, largest / change}) : 0;
   }
 
   const BodyProblem& problem_;
   const ProximalThresholds& thresholds_;
   ProximalStep step_;
-  std::vector<Vec3> before_;  ///< centres of the last step [N s]
-  std::vector<Twist> began_;  ///< and the motion where it began [m/s]
+  std::vector<Vec3> before_;     ///< centres of the last step [N s]
+  std::vector<Twist> began_;     ///< and the motion where it began [m/s]
+  bool began_balanced_ = false;  ///< that motion is the one of those centres, but for rounding
+  bool balanced_ = false;        ///< likewise the present ones
   int leaps_ = 0;
-  double fastest_ = 0;  ///< of the bodies without contacts, and of what contacts ask for [m/s]
-  double closing_ = 0;  ///< fastest normal velocity of those that carry behind the last step [m/s]
+  double first_largest_ = 0;  ///< impulse behind the first step [N s]
+  double fastest_ = 0;        ///< of the bodies without contacts [m/s]
+  double closing_ = 0;        ///< fastest normal velocity of contacts that carry behind the last step [m/s]
+  double asked_ = 0;          ///< and the fastest that these ask for [m/s]
   Minimised minimum_;
 };
 

@@ -17,8 +17,10 @@ struct ProximalThresholds {
   /// As long as steps move by more than `far` goals, > 1, a minimum need not be known better than to this
   /// part of what the last step has moved, in (0, 1).
   double far = 100, loose = 0.1;
-  /// Leaps of the impulses at most, >= 0. Each may double the largest one.
+  /// Leaps of the impulses at most, >= 0. Each may double the largest one, until this is so many times that
+  /// of the first step, >= 1.
   int most_leaps = 40;
+  double most_growth = 100;
   /// Normal velocities of contacts that carry, over the fastest velocity there is, in (0, 1): less of it is
   /// rounding, and says nothing of who carries.
   double rounding = 1e-12;

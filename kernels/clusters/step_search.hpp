@@ -48,12 +48,11 @@ struct StepStart {
 ///   bool firmer(bool small) const          whether the next one may be firmer; `small`: what is left of this
 ///                                          one is within the goal
 ///
-/// and may have
+/// and may have, for problems without friction,
 ///
-///   std::vector<Vec3> leap(double& work)   goes on as the last step has changed the impulses, where only
-///   they
-///                                          still change; returns their change since those of the problem
 ///   bool at_rest() const                   what changes the impulses yet is rounding
+///   double leap(double& work)              goes on as the last step has changed the impulses, so many times
+///   std::vector<Vec3> changes() const      the impulses then, since those of the problem
 template <class Steps>
 Correction search_by_steps(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds,
                            const SearchThresholds& search, Steps& steps, double& work) {
@@ -87,10 +86,14 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
     impulse = now.impulse;
-    if constexpr (requires { steps.leap(work); })
-      if (small && !known) impulse = steps.leap(work);
     moved = now.moved;
     last = firmness;
+    if constexpr (requires { steps.leap(work); })
+      if (small && !known && firmness >= search.firm_enough) {
+        // What follows a leap tells nothing of what is still to come.
+        if (steps.leap(work) > 0) last = std::numeric_limits<double>::infinity();
+        impulse = steps.changes();
+      }
     if (wary > 0)
       --wary;
     else if (steps.firmer(small))

@@ -245,13 +245,15 @@ TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDe
   // In step 2 rows of five grains, which lean by 10^-4, still close by 10^-7 m/s where others part by 10^-2.
   MadeScene made = make_scene("lattice", 1036, {});
   made.scene.setup.decomposition.subdomains = 7;
-  const AuditedRun run = audited(made, 3);
-  ASSERT_EQ(run.steps.size(), 3U);
+  const AuditedRun run = audited(made, 20);
+  int judged = 0;
   for (const AuditedStep& step : run.steps) {
     if (!step.certified || step.judged != Judged::yes) continue;
+    ++judged;
     EXPECT_LT(step.errors.wall_force, step.claimed) << step.step;
     EXPECT_LT(step.errors.contact_force, step.claimed) << step.step;
   }
+  EXPECT_GE(judged, 1);
 }
 
 TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {

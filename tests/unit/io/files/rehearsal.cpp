@@ -65,7 +65,14 @@ TEST_F(Rehearsal, DoesNotTakeOurOwnFaultsForThoseOfTheFile) {
 }
 
 TEST_F(Rehearsal, OfWhatTakesFarMoreMemoryThanTheFileHasIsAnError) {
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(__SANITIZE_ADDRESS__)  // by g++
+#define TALUS_OWN_LIMITS
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)  // by clang
+#define TALUS_OWN_LIMITS
+#endif
+#endif
+#ifdef TALUS_OWN_LIMITS
   GTEST_SKIP() << "a sanitizer has its own limits";
 #endif
   EXPECT_EQ(refusal_of([] {
