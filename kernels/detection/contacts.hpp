@@ -71,6 +71,7 @@ struct SingleContacts {
   std::vector<float> rn;          ///< normal impulse over `unit` [m/s]; empty with friction
   std::vector<float> mu;          ///< as in Contacts
   std::vector<float> vx, vy, vz;  ///< likewise
+  std::vector<float> reach;       ///< likewise
 };
 
 /// Drift at contact k, at a wall or where drifts_between; 0 where contacts have none.

@@ -18,7 +18,7 @@ struct ContactViewOf {
   const Number* rn;                     ///< without
   const Number* mu;                     ///< where each contact has friction of its own
   const Number *vx, *vy, *vz;           ///< drifts, or null
-  const double* reach;                  ///< in a cell under stress, else void
+  const Number* reach;                  ///< in a cell under stress, else void
   const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
@@ -87,6 +87,8 @@ struct LaneKernels {
                         const MomentumView&);
   void (*single_wall)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
                       const WallView&, const MomentumView&);
+  void (*single_cell)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
+                      const CellView&, const MomentumView&);
   void (*accumulate_grains)(const ContactView&, double* bodies);
   void (*accumulate_wall)(const ContactView&, double* bodies, const WallView&);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu, const WholeView&);

@@ -18,6 +18,7 @@ void allocate(SingleState& single, const Contacts& contacts, std::size_t bodies)
   resize_anew(c.rn, contacts.rn.size());
   resize_anew(c.mu, contacts.mu.size());
   for (std::vector<float>* part : {&c.vx, &c.vy, &c.vz}) resize_anew(*part, contacts.vx.size());
+  resize_anew(c.reach, contacts.reach.size());
   resize_anew(single.velocity, bodies);
   resize_anew(single.last_v, bodies);
 }
@@ -41,6 +42,7 @@ void narrow_geometry(const Contacts& contacts, ContactRange range, SingleContact
   round_numbers(contacts.vx, range, 1, single.vx);
   round_numbers(contacts.vy, range, 1, single.vy);
   round_numbers(contacts.vz, range, 1, single.vz);
+  round_numbers(contacts.reach, range, 1, single.reach);
 }
 
 void narrow_impulses(const Contacts& contacts, ContactRange range, SingleContacts& single) {
@@ -97,7 +99,7 @@ std::size_t memory_used(const SingleState& single) {
   const SingleContacts& c = single.contacts;
   std::size_t numbers = 0;
   for (const std::vector<float>* part :
-       {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn, &c.mu, &c.vx, &c.vy, &c.vz})
+       {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn, &c.mu, &c.vx, &c.vy, &c.vz, &c.reach})
     numbers += part->capacity();
   return numbers * sizeof(float) +
          sizeof(SingleVelocity) * (single.velocity.capacity() + single.last_v.capacity());

@@ -54,7 +54,7 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, Conta
           drift(arrays.vx),
           drift(arrays.vy),
           drift(arrays.vz),
-          contacts.reach.data(),
+          arrays.reach.data(),
           contacts.first_record.data(),
           contacts.second_record.data(),
           contacts.group.data() + range.begin,
@@ -189,6 +189,16 @@ void SweepKernels::sweep_wall(const Contacts& contacts, SingleState& single, Con
 }
 
 template <bool Friction>
+void SweepKernels::sweep_cell(const Contacts& contacts, SingleState& single, ContactRange range,
+                              ChunkFriction friction, CellCopy& cell, const SweepMomentum& momentum) const {
+  CellVelocity inv_mass = cell.inv_mass;
+  for (double& of : inv_mass) of *= single.contacts.unit;
+  lanes<Friction>(friction).single_cell(
+      view(contacts, single.contacts, range, single.velocity, Between::grains), impulses(single.contacts),
+      records(single.velocity), friction.mu, {cell.velocity.data(), inv_mass.data()}, view(momentum));
+}
+
+template <bool Friction>
 void SweepKernels::accumulate_grains(const Contacts& contacts, ContactRange range,
                                      std::span<Velocity> velocity) const {
   lanes<Friction>(0).accumulate_grains(view(contacts, range, velocity, Between::grains), records(velocity));
@@ -259,6 +269,8 @@ template void SweepKernels::sweep_grains<true>(const Contacts&, SingleState&, Co
                                                const SweepMomentum&) const;
 template void SweepKernels::sweep_wall<true>(const Contacts&, SingleState&, ContactRange, ChunkFriction,
                                              WallCopy&, const SweepMomentum&) const;
+template void SweepKernels::sweep_cell<true>(const Contacts&, SingleState&, ContactRange, ChunkFriction,
+                                             CellCopy&, const SweepMomentum&) const;
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>,
                                                ChunkFriction) const;
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, ChunkFriction,
@@ -278,6 +290,8 @@ template void SweepKernels::sweep_grains<false>(const Contacts&, SingleState&, C
                                                 const SweepMomentum&) const;
 template void SweepKernels::sweep_wall<false>(const Contacts&, SingleState&, ContactRange, ChunkFriction,
                                               WallCopy&, const SweepMomentum&) const;
+template void SweepKernels::sweep_cell<false>(const Contacts&, SingleState&, ContactRange, ChunkFriction,
+                                              CellCopy&, const SweepMomentum&) const;
 template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>,
                                                 ChunkFriction) const;
 template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, ChunkFriction,

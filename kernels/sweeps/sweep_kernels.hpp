@@ -61,7 +61,8 @@ class SweepKernels {
                   ChunkFriction friction, WallCopy& wall, const SweepMomentum& momentum) const;
 
   /// sweep_grains in a cell that follows a stress (cell_copy.hpp): W_nn and W_tt gain (|b|/d)^2/m of the
-  /// copy, a bound where not all components are free. The copy is split into 8 once more, as that of a wall.
+  /// copy, a bound where not all components are free. The copy is split into 16 once more, contact k of a
+  /// group against part k.
   template <bool Friction>
   void sweep_cell(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                   ChunkFriction friction, CellCopy& cell) const;
@@ -78,6 +79,9 @@ class SweepKernels {
   template <bool Friction>
   void sweep_wall(const Contacts& contacts, SingleState& single, ContactRange range, ChunkFriction friction,
                   WallCopy& wall, const SweepMomentum& momentum) const;
+  template <bool Friction>
+  void sweep_cell(const Contacts& contacts, SingleState& single, ContactRange range, ChunkFriction friction,
+                  CellCopy& cell, const SweepMomentum& momentum) const;
 
   /// V += M^-1 H r for the contacts of a chunk. After bodies were reset to their free velocities this makes V
   /// afresh from r.

@@ -185,7 +185,9 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
     const int sweep = schedule_.sweep(epoch);
     const SweepMomentum momentum{courses_.beta(sweep), courses_.omega(sweep), acceleration_.steps};
     SingleState& single = state_.single;
-    if (stressed(c))
+    if (course.single && stressed(c))
+      kernels_.sweep_cell<Friction>(contacts, single, range, friction, state_.cell.copies[c], momentum);
+    else if (stressed(c))
       kernels_.sweep_cell<Friction>(contacts, range, velocity, friction, state_.cell.copies[c], momentum);
     else if (course.single && wall)
       kernels_.sweep_wall<Friction>(contacts, single, range, friction, copy, momentum);

@@ -172,8 +172,7 @@ void SolverLoop::begin_course(const SweepPlan& plan, int from) {
 bool SolverLoop::single_will_do(SweepKind kind) const {
   const ErrorHistory& history = certificate_.history();
   return kind == SweepKind::momentum && settings_.precision == Precision::mixed && !schwarz() &&
-         !state_.cell.loaded() && problem_.grains_alike() &&
-         problem_.candidates() >= single_use.least_candidates &&
+         problem_.grains_alike() && problem_.candidates() >= single_use.least_candidates &&
          (history.empty() || history.last().error_rms > single_use.least_error);
 }
 

@@ -156,7 +156,9 @@ SILO_FILL = 0.32  # [s]; what is left of the kinetic energy then is a thousandth
 SILO_COUNT = 100000
 
 
-def silo_scene(data, out):
+def silo_scene(data, out, orifice=0.03):
+    """The published silo, whose funnel of 45 degrees ends at an orifice of this radius [m]: 0.03, large, or 0.02, small."""
+    lip = 0.0145778 - (0.1 - orifice)
     return f"""name = "silo-100k"
 time_step = 5e-4
 gravity = [0, 0, -9.8]
@@ -173,7 +175,7 @@ region = {{ shape = "cylinder", start = [0, 0, 0.0145778], end = [0, 0, 0.37], r
 name = "out"
 stage = "drain"
 interval = 0.01
-region = {{ shape = "beyond", point = [0, 0, -0.1], normal = [0, 0, -1] }}
+region = {{ shape = "beyond", point = [0, 0, {lip - 0.045:.7f}], normal = [0, 0, -1] }}
 [[wall]]
 name = "tube"
 shape = "cylinder"
@@ -186,21 +188,21 @@ material = "steel"
 name = "funnel"
 shape = "cone"
 inside = true
-start = [0, 0, -0.0554222]
+start = [0, 0, {lip:.7f}]
 end = [0, 0, 0.0145778]
-start_radius = 0.03
+start_radius = {orifice}
 end_radius = 0.1
 material = "steel"
 [[wall]]
 name = "gate"
 side = "z-"
-position = -0.0554222
+position = {lip:.7f}
 until_stage = "drain"
 material = "steel"
 [[probe]]
 name = "orifice"
 every = 0.01
-region = {{ shape = "disc", centre = [0, 0, -0.0554222], axis = [0, 0, -1], radius = 0.0301 }}
+region = {{ shape = "disc", centre = [0, 0, {lip:.7f}], axis = [0, 0, -1], radius = {orifice + 1e-4:.4f} }}
 [[stage]]
 name = "fill"
 end = {{ time = {SILO_FILL} }}

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Discharge of a silo with grains of 6 mm: Beverloo's law, the head, no friction, a mesh, and looser solutions.
 
-    tests/bench/silo.py published|orifices|head|fluid|mesh|tolerance OUT [--talus build/release/talus] [--set KEY=VALUE ...]
+    tests/bench/silo.py published|ratio|orifices|head|fluid|mesh|tolerance OUT [--talus build/release/talus] [--set KEY=VALUE ...]
 
 The silo is that of Dosta et al. (2024) with its materials: a tube of radius 0.1 m over a funnel of 45 degrees. It is
 filled once, on a funnel that goes on to a radius of 18 mm (OUT/fill-COUNT); each discharge begins from there, with the
@@ -303,30 +303,43 @@ def tolerance(runs):
     return True
 
 
-def published(runs):
-    """The published case, but for grains above z = 0.053 m, which are taken away when it opens: 40,000 are left."""
-    scene = silo_scene(None, None)
+def published_discharge(runs, name, orifice, duration):
+    """The published case, but for grains above z = 0.053 m, which are taken away when it opens: some 40,000 are left."""
+    scene = silo_scene(None, None, orifice)
     parts = [scene.index(f"[[{part}]]") for part in ("insert", "remove", "probe", "stage")]
     gate, drain = scene.index('[[wall]]\nname = "gate"'), scene.index('[[stage]]\nname = "drain"')
     solver = scene.index("[solver]")
-    filled = runs.run("fill-published", scene[:parts[1]] + scene[scene.index("[[wall]]"):drain].replace(
+    filled = runs.run(f"fill-{name}", scene[:parts[1]] + scene[scene.index("[[wall]]"):drain].replace(
         'until_stage = "drain"\n', "") + scene[solver:])[0]
     state = f'[[sample]]\nkind = "state"\nfile = "{(filled / "results.h5").resolve()}"\n'
     cut = ('[[remove]]\nname = "above"\nat = [0]\n'
            'region = { shape = "beyond", point = [0, 0, 0.053], normal = [0, 0, 1] }\n')
     left = '[[probe]]\nname = "left"\nregion = { shape = "beyond", point = [0, 0, 1], normal = [0, 0, -1] }\n'
-    results, seconds = runs.run("published", scene[:parts[0]] + state + cut + scene[parts[1]:gate] + left
-                                + scene[parts[2]:parts[3]] + scene[drain:], ["stage.drain.end.time=0.5"])
+    results, seconds = runs.run(name, scene[:parts[0]] + state + cut + scene[parts[1]:gate] + left
+                                + scene[parts[2]:parts[3]] + scene[drain:], [f"stage.drain.end.time={duration}"])
     probes = rows(results / "probes.csv")
     count = max(int(row["count"]) for row in probes if row["probe"] == "left")
     steps = rows(results / "steps.csv")
-    found = Discharge("published", results, count, seconds, len(steps),
+    found = Discharge(name, results, count, seconds, len(steps),
                       sum(row["converged"] != "1" for row in steps), sum(int(row["iterations"]) for row in steps))
     found.said()
+    return found
+
+
+def published(runs):
+    found = published_discharge(runs, "published", 0.03, 0.5)
     return verdict("rate [grains/s]", found.rate, "23,200 +- 5 %", abs(found.rate - 23200) <= 0.05 * 23200)
 
 
-STUDIES = {"published": published, "orifices": orifices, "head": head, "fluid": fluid, "mesh": mesh_case, "tolerance": tolerance}
+def ratio(runs):
+    """Large orifice over small one, of 60 and 40 mm, from fillings of their own."""
+    large = published_discharge(runs, "published-large", 0.03, 0.8)
+    small = published_discharge(runs, "published-small", 0.02, 2.0)
+    found = large.rate / small.rate
+    return verdict("rate of the large orifice over the small one's", found, "3.10 +- 0.06", abs(found - 3.10) <= 0.06)
+
+
+STUDIES = {"published": published, "ratio": ratio, "orifices": orifices, "head": head, "fluid": fluid, "mesh": mesh_case, "tolerance": tolerance}
 
 
 def main():

@@ -85,7 +85,7 @@ Section<SolverSettings> solver_keys() {
               "precision", {"mixed", "double"},
               "Numbers of the sweeps. `mixed`: single precision with momentum, on more "
               "than 1000 candidates, until the error is 1e-5; what is judged and written is in "
-              "double precision, and so are the sweeps of a cell that follows a stress.",
+              "double precision.",
               &SolverSettings::precision),
           choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
                                  "Instructions of the sweeps; `auto`: the widest that the processors of all "

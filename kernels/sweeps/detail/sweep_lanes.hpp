@@ -121,6 +121,7 @@ template <class V, class Only>
 
 /// Without drift, velocities of bodies are those of their records, and those of walls are theirs.
 struct NoDrift {
+  [[gnu::always_inline]] void enter(std::size_t) const {}
   [[gnu::always_inline]] NoDrift from(std::size_t) const { return {}; }
   template <class V, class Only>
   [[gnu::always_inline]] void add_to(Space<V>&, std::size_t, Only) const {}
@@ -134,6 +135,7 @@ struct NoDrift {
 template <class Number>
 struct PairDrift {
   const Number *x, *y, *z;
+  [[gnu::always_inline]] void enter(std::size_t) const {}
   [[gnu::always_inline]] PairDrift from(std::size_t k) const { return {x + k, y + k, z + k}; }
   template <class V, class Only>
   [[gnu::always_inline]] Space<V> velocity(std::size_t at, Only only) const {
@@ -153,8 +155,8 @@ struct PairDrift {
 };
 
 /// How the contacts of a chunk are swept: their friction, where they start, and their drift, which is what
-/// moves their bodies besides the records. It changes the velocities that contacts see (take) and is given
-/// their impulses.
+/// moves their bodies besides the records. It hears of each group that begins (enter), changes the velocities
+/// that contacts see (take) and is given their impulses.
 template <class Mu, class Start, class Drift = NoDrift>
 struct SweepRule {
   Mu friction;
@@ -260,6 +262,7 @@ template <bool Friction, class V, class Rule, class Number>
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
+    rule.drift.enter(k);
     for (; k + at_once <= end; k += at_once)
       sweep_block<Friction, V, blocks_at_once>({c, k}, {r, k}, first_of(c, k, bodies),
                                                second_of(c, k, bodies), rule.from(k), AllLanes{});
