@@ -30,14 +30,11 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   contacts.rn.resize(friction ? 0 : n);
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
-  for (auto* values : {&contacts.first_record, &contacts.second_record}) values->resize(n);
   contacts.candidate.resize(n);
   std::iota(contacts.candidate.begin(), contacts.candidate.end(), 0);
   for (std::size_t k = 0; k < candidates.grain_pairs.size(); ++k) {
     contacts.first[k] = candidates.grain_pairs[k].first;
     contacts.second[k] = candidates.grain_pairs[k].second;
-    contacts.first_record[k] = record_of(contacts.first[k]);
-    contacts.second_record[k] = record_of(contacts.second[k]);
   }
   const bool blocks = std::ranges::find(chunks.kind, ChunkKind::blocks) != chunks.kind.end();
   contacts.levers.resize(blocks ? n : 0);
@@ -130,9 +127,8 @@ std::size_t memory_used(const Contacts& contacts) {
         &contacts.arm, &contacts.vx, &contacts.vy, &contacts.vz, &contacts.reach})
     bytes += values->capacity() * sizeof(double);
   return bytes +
-         (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +
-          contacts.second_record.capacity() + contacts.candidate.capacity() + contacts.count.capacity() +
-          contacts.passed.capacity()) *
+         (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
+          contacts.count.capacity() + contacts.passed.capacity()) *
              4 +
          contacts.group.capacity() + contacts.levers.capacity() * sizeof(Levers) +
          contacts.spin.capacity() * sizeof(Vec3) + contacts.balls.capacity() * 2;

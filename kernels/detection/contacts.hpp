@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "kernels/bodies/bodies.hpp"
@@ -11,12 +12,39 @@
 
 namespace talus {
 
-/// Where the record of a body begins, counted in numbers (VelocityOf). It fits 32 bits because cut_chunks
-/// admits at most most_bodies_of_a_process bodies.
-inline std::uint32_t record_of(Slot slot) {
-  constexpr std::uint32_t numbers = sizeof(Velocity) / sizeof(double);
+/// A body of a contact, or, as -1 - feature, what a grain touches of a wall: a slot, kept as the place where
+/// the record of the body begins, counted in numbers (VelocityOf), since a sweep takes fewer instructions
+/// from there to an address. It fits 32 bits because cut_chunks admits at most most_bodies_of_a_process
+/// bodies; features have the places in between, where no record begins.
+class ContactBody {
+ public:
+  ContactBody() = default;
+  /// Implicit, as is the way back: it is a slot in another notation.
+  ContactBody(Slot slot) : place_(slot >= 0 ? numbers * to_unsigned(slot) : place_of_feature(-1 - slot)) {}
+  operator Slot() const {
+    const std::uint32_t in_record = place_ % numbers, record = place_ / numbers;
+    return in_record == 0 ? static_cast<Slot>(record)
+                          : -1 - static_cast<Slot>(record * (numbers - 1) + in_record - 1);
+  }
+
+ private:
+  static constexpr std::uint32_t numbers = sizeof(Velocity) / sizeof(double);
   static_assert(most_bodies_of_a_process * numbers <= std::size_t{1} << 32);
-  return numbers * static_cast<std::uint32_t>(slot);
+  static std::uint32_t to_unsigned(Slot slot) { return static_cast<std::uint32_t>(slot); }
+  static std::uint32_t place_of_feature(Slot feature) {
+    const std::uint32_t of = to_unsigned(feature);
+    return of / (numbers - 1) * numbers + 1 + of % (numbers - 1);
+  }
+
+  std::uint32_t place_ = 0;
+};
+inline std::size_t at(ContactBody body) {
+  return static_cast<std::size_t>(Slot{body});
+}
+/// For kernels that read plain numbers: the places of records.
+inline const std::uint32_t* record_places(const ContactBody* bodies) {
+  static_assert(std::is_standard_layout_v<ContactBody> && sizeof(ContactBody) == sizeof(std::uint32_t));
+  return reinterpret_cast<const std::uint32_t*>(bodies);
 }
 
 /// At a contact of blocks the surface of each body moves with u + lever w, of VelocityOf. The second lever
@@ -50,11 +78,8 @@ struct Contacts {
                                ///< empty where no cell follows a stress
   std::vector<double> mu;      ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Levers> levers;  ///< of contacts in chunks of blocks; empty where no body is a clump
-  std::vector<std::uint16_t> balls;  ///< likewise: Candidates::balls
-  std::vector<Slot> first, second;   ///< second is -1 - feature at a wall: -1 at a plane
-  /// record_of first and second, from where a sweep takes fewer instructions to an address. The second means
-  /// nothing at a wall.
-  std::vector<std::uint32_t> first_record, second_record;
+  std::vector<std::uint16_t> balls;        ///< likewise: Candidates::balls
+  std::vector<ContactBody> first, second;  ///< slots; second is -1 - feature at a wall: -1 at a plane
   std::vector<std::int32_t> candidate;
   std::vector<std::int32_t> count;   ///< per chunk
   std::vector<std::int32_t> passed;  ///< per chunk: pairs that went through one another on their way to x, or

@@ -21,11 +21,12 @@ struct Pairing {
   double radius_i, radius_j;
 };
 Pairing meet(const PairView& pairs, const Domain& domain, std::size_t k) {
-  const std::size_t i = at(pairs.first[k]), j = at(pairs.second[k]);
+  const std::size_t i = pairs.first[k] / record_numbers, j = pairs.second[k] / record_numbers;
   using Map = Eigen::Map<const Vec3>;
   const Vec3 x_i = Map(pairs.x + 3 * i), x_j = Map(pairs.x + 3 * j);
   return {domain.separation(x_i, x_j),
-          Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j) - domain.image_velocity(x_i, x_j),
+          Map(pairs.velocity + pairs.first[k]) - Map(pairs.velocity + pairs.second[k]) -
+              domain.image_velocity(x_i, x_j),
           pairs.radius[i], pairs.radius[j]};
 }
 
@@ -60,12 +61,13 @@ struct ChunkPhase {
 };
 
 /// Restitution of each pair of a chunk that mixes laws, in the places of `contacts`; empty for other chunks.
-std::vector<double> own_restitution(const ChunkPhase& phase, const Slot* first, const Slot* second) {
+std::vector<double> own_restitution(const ChunkPhase& phase, std::span<const ContactBody> first,
+                                    std::span<const ContactBody> second) {
   std::vector<double> own;
   const Chunks& chunks = phase.chunks;
   if (chunks.law[phase.chunk] != mixed_laws) return own;
   const MaterialView materials = materials_of(phase.in);
-  for (std::size_t k = 0; k < at(chunks.begin[phase.chunk + 1] - chunks.begin[phase.chunk]); ++k)
+  for (std::size_t k = 0; k < first.size(); ++k)
     own.push_back(phase.in.laws.laws()[materials.law(GrainPair{first[k], second[k]})].restitution);
   return own;
 }
@@ -73,15 +75,16 @@ std::vector<double> own_restitution(const ChunkPhase& phase, const Slot* first, 
 void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t begin = at(chunks.begin[chunk]), count = at(chunks.begin[chunk + 1]) - begin;
-  Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
+  const auto first = std::span<const ContactBody>(contacts.first).subspan(begin, count),
+             second = std::span<const ContactBody>(contacts.second).subspan(begin, count);
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
   const std::vector<double> restitution = own_restitution(phase, first, second);
   const PairView pairs{in.x.data()->data(),
                        in.radius.data(),
                        in.velocity.data()->u,
-                       first,
-                       second,
+                       record_places(first.data()),
+                       record_places(second.data()),
                        count,
                        restitution.empty() ? nullptr : restitution.data(),
                        in.domain.repeats ? &in.domain.cell : nullptr,
@@ -138,7 +141,6 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     contacts.nz[place] = wall.normal[2];
     contacts.first[place] = body;
     write_drift(phase, wall.normal, place, contacts);
-    contacts.first_record[place] = record_of(body);
     contacts.second[place] = -1;
     contacts.candidate[place++] = static_cast<std::int32_t>(k);
   }
@@ -188,7 +190,6 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     contacts.nz[place] = point->normal[2];
     contacts.first[place] = body;
     write_drift(phase, point->normal, place, contacts);
-    contacts.first_record[place] = record_of(body);
     contacts.second[place] = -1 - feature;
     contacts.candidate[place++] = static_cast<std::int32_t>(k);
   }

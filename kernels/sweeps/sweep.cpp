@@ -74,7 +74,7 @@ void relax(Contacts& contacts, ContactRange range, std::span<const double> befor
            Multiplicities multiplicity, std::span<Velocity> velocity, WallCopy* wall) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const auto i = static_cast<std::size_t>(contacts.first[k]);
-    const auto j = static_cast<std::size_t>(std::max(contacts.second[k], 0));
+    const auto j = static_cast<std::size_t>(std::max(Slot{contacts.second[k]}, 0));
     const auto m = wall ? multiplicity[i] : std::max(multiplicity[i], multiplicity[j]);
     if (m == 1) continue;
     const Space<double> n{contacts.nx[k], contacts.ny[k], contacts.nz[k]};

@@ -239,8 +239,6 @@ void restore_contacts(const Checkpoint& from, StepState& state) {
       contacts.candidate[k] = static_cast<std::int32_t>(candidate);
       contacts.first[k] = pair.first;
       contacts.second[k] = pair.second;
-      contacts.first_record[k] = record_of(pair.first);
-      contacts.second_record[k] = record_of(pair.second);
     }
     std::uint8_t* group = contacts.group.data() + begin;
     for (std::int32_t sum = 0; sum < count; sum += *group++) {

@@ -122,7 +122,7 @@ void ChunkWork::accumulate(std::size_t c, int epoch) {
   add_moments(state_.contacts, range, state_.bodies.radius, velocity);
   if (stressed(c)) {
     CellCopy& copy = state_.cell.copies[c];
-    copy.velocity = impulse_on_cell(state_.contacts, range);
+    copy.velocity = cell_impulses_[c] = impulse_on_cell(state_.contacts, range);
     for (std::size_t k = 0; k < cell_freedoms; ++k) copy.velocity[k] *= copy.inv_mass[k];
   }
   if (!at_wall(c)) {
@@ -157,7 +157,6 @@ void ChunkWork::measure(std::size_t c) {
   } else if (stressed(c)) {
     const CellCopy whole{state_.cell.copies[c].velocity, state_.cell.inv_mass()};
     errors_[c] = kernels_.error_cell<Friction>(contacts, range_of(c), velocity, friction_of(c), whole, parts);
-    cell_impulses_[c] = impulse_on_cell(contacts, range_of(c));
   } else {
     errors_[c] = kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
   }

@@ -31,8 +31,7 @@ void fetch_subdomain(const StepState& state, const AccelerationHistory& accelera
       if (in_single)
         fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
               single.rn, single.mu, single.reach, acceleration.steps.x, acceleration.steps.y,
-              acceleration.steps.z, acceleration.steps.n, contacts.first_record, contacts.second_record,
-              contacts.group);
+              acceleration.steps.z, acceleration.steps.n, contacts.first, contacts.second, contacts.group);
       else
         fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
               contacts.rz, contacts.rn, contacts.mu, contacts.reach);

@@ -81,7 +81,6 @@ bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& mee
 
 void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t place,
            Contacts& contacts) {
-  const bool wall = meeting.second < 0;
   contacts.nx[place] = meeting.touch.normal[0];
   contacts.ny[place] = meeting.touch.normal[1];
   contacts.nz[place] = meeting.touch.normal[2];
@@ -90,8 +89,6 @@ void write(const Meeting& meeting, double bias, std::size_t candidate, std::size
   contacts.balls[place] = meeting.balls;
   contacts.first[place] = meeting.first;
   contacts.second[place] = meeting.second;
-  contacts.first_record[place] = record_of(meeting.first);
-  if (!wall) contacts.second_record[place] = record_of(meeting.second);
   contacts.candidate[place] = static_cast<std::int32_t>(candidate);
 }
 

@@ -23,8 +23,8 @@ constexpr std::size_t few = 16;  ///< repairs pay if at most one contact in so m
 template <class Rule>
 void for_each_array(Contacts& contacts, Rule rule) {
   for (auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias}) rule(*values);
-  for (auto* values : {&contacts.candidate, &contacts.first, &contacts.second}) rule(*values);
-  for (auto* values : {&contacts.first_record, &contacts.second_record}) rule(*values);
+  rule(contacts.candidate);
+  for (auto* values : {&contacts.first, &contacts.second}) rule(*values);
 }
 
 /// The groups of a chunk while they are repaired. Places count from the chunk's first.
@@ -70,9 +70,9 @@ class Repair {
   }
   /// Whether the pair at `place` shares no grain with the contacts of a group that it is not in.
   bool fits(std::size_t place, std::size_t group) const {
-    const Slot *first = places_.contacts.first.data() + begin_,
-               *second = places_.contacts.second.data() + begin_;
-    const Slot i = first[place], j = second[place];
+    const std::uint32_t *first = record_places(places_.contacts.first.data()) + begin_,
+                        *second = record_places(places_.contacts.second.data()) + begin_;
+    const std::uint32_t i = first[place], j = second[place];
     for (std::size_t k = group_begin_[group]; k < end_of(group); ++k)
       if (places_.contact[k] != 0 && (first[k] == i || first[k] == j || second[k] == i || second[k] == j))
         return false;
@@ -166,7 +166,7 @@ void deal_groups(const ChunkPlaces& places) {
   std::fill_n(sizes, late.size(), std::uint8_t{1});
   from.insert(from.end(), others.begin(), others.end());
   contacts.count[places.chunk] = static_cast<std::int32_t>(count - others.size());
-  std::tuple<std::vector<double>, std::vector<std::int32_t>, std::vector<std::uint32_t>> rooms;
+  std::tuple<std::vector<double>, std::vector<std::int32_t>, std::vector<ContactBody>> rooms;
   for_each_array(contacts, [&](auto& values) {
     auto& before = std::get<std::remove_reference_t<decltype(values)>>(rooms);
     const auto start = values.begin() + static_cast<std::ptrdiff_t>(begin);

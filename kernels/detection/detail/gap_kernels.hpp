@@ -13,12 +13,14 @@ namespace talus {
 
 struct GapRule;
 
+constexpr std::uint32_t record_numbers = 8;  ///< in the record of a body (VelocityOf)
+
 /// Pairs of grains whose gaps are to be found.
 struct PairView {
   const double* x;                      ///< 3 per body: its centre [m]
   const double* radius;                 ///< 1 per body [m]
   const double* velocity;               ///< 8 per body: its record
-  const std::int32_t *first, *second;   ///< per pair: slots of its bodies
+  const std::uint32_t *first, *second;  ///< per pair: where the records of its bodies begin, in numbers
   std::size_t count;                    ///< of pairs
   const double* restitution = nullptr;  ///< per pair; null: all have that of the rule
   const PeriodicSpace* cell = nullptr;  ///< null: between walls

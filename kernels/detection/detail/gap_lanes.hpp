@@ -126,15 +126,14 @@ template <int W, class S, class E>
   constexpr std::size_t ahead = 24;  // prefetch distance in pairs: sweeps do not cache these data
   std::size_t i[W], j[W];
   const auto slots = [&](std::size_t k, std::size_t lane) {
-    i[lane] = static_cast<std::size_t>(static_cast<std::uint32_t>(pairs.first[k]));
-    j[lane] = static_cast<std::size_t>(static_cast<std::uint32_t>(pairs.second[k]));
+    i[lane] = std::size_t{pairs.first[k] / record_numbers};
+    j[lane] = std::size_t{pairs.second[k] / record_numbers};
   };
   // Inlined by order: g++ 12 takes a function that only prefetches for one without effects, and drops its
   // calls.
-  const auto ask = [&](std::int32_t slot) __attribute__((always_inline)) {
-    const auto s = static_cast<std::size_t>(static_cast<std::uint32_t>(slot));
-    __builtin_prefetch(pairs.x + 3 * s);
-    __builtin_prefetch(pairs.velocity + 8 * s);
+  const auto ask = [&](std::uint32_t place) __attribute__((always_inline)) {
+    __builtin_prefetch(pairs.x + 3 * std::size_t{place / record_numbers});
+    __builtin_prefetch(pairs.velocity + place);
   };
   std::size_t k = 0;
   for (; k + W <= pairs.count; k += W) {

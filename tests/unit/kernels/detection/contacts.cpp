@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "tests/unit/dense_sample.hpp"
@@ -19,6 +20,18 @@ using test::uniform;
 void set_random_impulses(Candidates& candidates, std::uint64_t seed) {
   Random random(seed);
   for (double& r : candidates.impulse.values()) r = uniform(random, -1, 1);
+}
+
+// In the same 32 bits a body up to the last that a process may have, and any feature of a wall.
+TEST(ContactBody, IsASlotOrAFeatureOfAWall) {
+  constexpr Slot last = static_cast<Slot>(most_bodies_of_a_process - 1),
+                 least = std::numeric_limits<Slot>::min();
+  for (const Slot slot : {0, 1, 7, 8, 1000003, last, -1, -2, -7, -8, -9, -100000007, least + 1, least}) {
+    const ContactBody body = slot;
+    EXPECT_EQ(Slot{body}, slot);
+    if (slot < 0) continue;
+    EXPECT_EQ(*record_places(&body), 8 * std::uint64_t(slot));
+  }
 }
 
 TEST(Contacts, AreTheCandidatesNearerThanTheAlertDistance) {

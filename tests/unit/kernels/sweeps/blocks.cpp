@@ -148,8 +148,6 @@ TEST(Blocks, OfSpheresAreSweptAsSpheresAre) {
     const Vec3 n = one.n();
     cross << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
     one.contacts.levers[0] = {cross, -cross};
-    one.contacts.first_record = {0};
-    one.contacts.second_record = {8};
     one.contacts.group = {1};
     OneContact sphere = one;
     sweep_blocks(one.contacts, {0, 1}, one.velocity, 0.4, nullptr);
