@@ -8,14 +8,17 @@
 DATA is a folder with the published files (impact-25k-spheres.csv, drum-spheres.csv and the references' curves). The
 silo makes its own filling, 100,000 grains that fall from a loose cloud, and opens its gate after SILO_FILL. The
 scene and its grains are written to OUT, the results to OUT/results; then the curves are compared (with --only-compare
-those of an earlier run). Exit code 1 where a number leaves its band.
+those of an earlier run). Exit code 1 where a number leaves its band. `impact --seeds N` runs the case N times, each
+time with the grains shifted by up to 1e-9 m, and prints what each gives and their scatter.
 """
 
 import argparse
 import csv
 import math
 import pathlib
+import random
 import resource
+import statistics
 import subprocess
 import sys
 
@@ -64,8 +67,16 @@ def write_grains(path, spheres, material):
             file.write(f"{s['id']},{s['x']},{s['y']},{s['z']},{s['radius']},{material(s)}\n")
 
 
-def impact_scene(data, out):
-    write_grains(out / "grains.csv", rows(data / "impact-25k-spheres.csv"), lambda s: "M1")
+def shifted(spheres, seed):
+    """The spheres, each shifted by up to 1e-9 m along every axis; with seed 0 as they are."""
+    draws = random.Random(seed)
+    for s in spheres if seed else []:
+        s.update({axis: repr(float(s[axis]) + draws.uniform(-1e-9, 1e-9)) for axis in "xyz"})
+    return spheres
+
+
+def impact_scene(data, out, seed=0):
+    write_grains(out / "grains.csv", shifted(rows(data / "impact-25k-spheres.csv"), seed), lambda s: "M1")
     return f"""name = "impact-25k"
 time_step = 1e-4
 gravity = [0, 0, -9.8]
@@ -239,8 +250,36 @@ def said(name, value, band, inside):
     return inside
 
 
+def ball_of(results):
+    return [(float(r["time"]), float(r["z"])) for r in rows(results / "bodies.csv") if r["body"] == "ball"]
+
+
+def rebound_speed(curve):
+    """Of the ball after it has met the floor, mean from 0.035 to 0.045 s [m/s]."""
+    return (at(curve, 0.045) - at(curve, 0.035)) / 0.01
+
+
+def impact_seeds(args):
+    """What each seed gives, beside the references."""
+    found = []
+    for seed in range(1, args.seeds + 1):
+        folder = args.out / f"seed-{seed}"
+        code, seconds = run(args, impact_scene, folder, seed=seed)
+        if code not in (0, 3):
+            return code
+        ball = ball_of(folder / "results")
+        time, lowest = min(ball, key=lambda row: row[1])
+        found.append((lowest - 0.06, time, rebound_speed(ball)))
+        print("seed {}: deepest {:.4f} m at {:.4f} s, rebound {:.3f} m/s".format(seed, *found[-1])
+              + f"; exit code {code}, {seconds:.0f} core-s", flush=True)
+    for name, values in zip(("deepest [m]", "at [s]", "rebound [m/s]"), zip(*found)):
+        print(f"{name:14s} mean {statistics.mean(values):.4f}, scatter {statistics.pstdev(values):.4f}, "
+              f"{min(values):.4f} to {max(values):.4f}")
+    return 0
+
+
 def compare_impact(data, results):
-    ball = [(float(r["time"]), float(r["z"])) for r in rows(results / "bodies.csv") if r["body"] == "ball"]
+    ball = ball_of(results)
     references = curves(data / "impact-25k-ball.csv", "z")
     # The references' clocks differ by what they fall in 0.05 ms before the first row.
     worst = max(abs(z - sum(known) / len(known))
@@ -250,8 +289,8 @@ def compare_impact(data, results):
     ok = said("deepest, z - 0.06 [m]", deepest[1] - 0.06, "-0.1385 +- 0.002", abs(deepest[1] - 0.06 + 0.1385) <= 0.002)
     ok &= said("at [s]", deepest[0], "0.030 +- 0.001", abs(deepest[0] - 0.030) <= 0.001)
     ok &= said("falling curve to 0.03 s, furthest off [m]", worst, "<= 0.0015 of the mean", worst <= 0.0015)
-    print(f"{'speed of the rebound, 0.035 to 0.045 s [m/s]':46s} {(at(ball, 0.045) - at(ball, 0.035)) / 0.01:12.3g}   "
-          + ", ".join(f"{code} {(at(c, 0.045) - at(c, 0.035)) / 0.01:.3g}" for code, c in references.items()))
+    print(f"{'speed of the rebound, 0.035 to 0.045 s [m/s]':46s} {rebound_speed(ball):12.3g}   "
+          + ", ".join(f"{code} {rebound_speed(c):.3g}" for code, c in references.items()))
     return ok
 
 
@@ -330,6 +369,20 @@ CASES = {"impact": (impact_scene, compare_impact), "drum": (drum_scene, compare_
          "silo": (silo_scene, compare_silo)}
 
 
+def run(args, scene, out, **choices):
+    """Runs a scene into out/results: exit code and core-seconds."""
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "scene.toml").write_text(scene(args.data, out, **choices))
+    command = [args.talus, "run", str(out / "scene.toml"), "--out", str(out / "results"), "--force",
+               "--threads", args.threads]
+    for change in args.set:
+        command += ["--set", change]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    code = subprocess.run(command).returncode
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return code, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("case", choices=CASES)
@@ -339,18 +392,14 @@ def main():
     parser.add_argument("--threads", default="1")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--only-compare", action="store_true")
+    parser.add_argument("--seeds", type=int, default=0, metavar="N", help="impact: so many runs from shifted grains")
     args = parser.parse_args()
     scene, compare = CASES[args.case]
+    if args.seeds:
+        return impact_seeds(args) if args.case == "impact" else parser.error("--seeds is for the impact")
     if not args.only_compare:
-        args.out.mkdir(parents=True, exist_ok=True)
-        (args.out / "scene.toml").write_text(scene(args.data, args.out))
-        command = [args.talus, "run", str(args.out / "scene.toml"), "--out", str(args.out / "results"), "--force",
-                   "--threads", args.threads]
-        for change in args.set:
-            command += ["--set", change]
-        code = subprocess.run(command).returncode
-        used = resource.getrusage(resource.RUSAGE_CHILDREN)
-        print(f"exit code {code}, {used.ru_utime + used.ru_stime:.1f} core-seconds")
+        code, seconds = run(args, scene, args.out)
+        print(f"exit code {code}, {seconds:.1f} core-seconds")
         if code not in (0, 3):
             return code
     return 0 if compare(args.data, args.out / "results") else 1
