@@ -9,7 +9,9 @@ DATA is a folder with the published files (impact-25k-spheres.csv, drum-spheres.
 silo makes its own filling, 100,000 grains that fall from a loose cloud, and opens its gate after SILO_FILL. The
 scene and its grains are written to OUT, the results to OUT/results; then the curves are compared (with --only-compare
 those of an earlier run). Exit code 1 where a number leaves its band. `impact --seeds N` runs the case N times, each
-time with the grains shifted by up to 1e-9 m, and prints what each gives and their scatter.
+time with the grains shifted by up to 1e-9 m, and prints what each gives and their scatter. `impact --count N` lets
+the ball fall onto an own filling of N grains, deposited and then left to come to rest; no curve of the
+references goes with it.
 """
 
 import argparse
@@ -75,13 +77,7 @@ def shifted(spheres, seed):
     return spheres
 
 
-def impact_scene(data, out, seed=0):
-    write_grains(out / "grains.csv", shifted(rows(data / "impact-25k-spheres.csv"), seed), lambda s: "M1")
-    return f"""name = "impact-25k"
-time_step = 1e-4
-gravity = [0, 0, -9.8]
-{MATERIALS}{pairs()}
-[[sample]]
+PUBLISHED_BED = """[[sample]]
 kind = "bodies"
 file = "grains.csv"
 [[sample]]
@@ -91,6 +87,42 @@ position = [0, 0, 0.06]
 radius = 0.01
 velocity = [0, 0, -5]
 material = "steel"
+"""
+
+
+def own_bed(count):
+    return f"""[[sample]]
+kind = "deposition"
+count = {count}
+base = [0.098, 0.06]
+origin = [-0.049, -0.03, -0.090243]
+radius_distribution = "uniform"
+radius_min = 0.00099
+radius_max = 0.00101
+material = "M1"
+[[insert]]
+name = "ball"
+material = "steel"
+radius = 0.01
+count = 1
+velocity = [0, 0, -5]
+stage = "impact"
+track = true
+region = {{ shape = "disc", centre = [0, 0, 0.06], radius = 0.01 }}
+[[stage]]
+name = "settle"
+end = {{ equilibrium = 1e-2, time = 0.1 }}
+"""
+
+
+def impact_scene(data, out, seed=0, count=0):
+    if not count:
+        write_grains(out / "grains.csv", shifted(rows(data / "impact-25k-spheres.csv"), seed), lambda s: "M1")
+    return f"""name = "impact"
+time_step = 1e-4
+gravity = [0, 0, -9.8]
+{MATERIALS}{pairs()}
+{own_bed(count) if count else PUBLISHED_BED}
 {plane("x-", -0.049)}{plane("x+", 0.049)}{plane("y-", -0.03)}{plane("y+", 0.03)}{plane("z-", -0.090243)}
 [[stage]]
 name = "impact"
@@ -278,6 +310,22 @@ def impact_seeds(args):
     return 0
 
 
+def impact_count(args):
+    """A filling of `args.count` grains: how deep the ball gets, and when it is at rest."""
+    code, seconds = run(args, impact_scene, args.out, count=args.count)
+    if code not in (0, 3):
+        return code
+    ball = ball_of(args.out / "results")
+    start = ball[0][0]
+    time, lowest = min(ball, key=lambda row: row[1])
+    steps = [r for r in rows(args.out / "results" / "steps.csv") if float(r["time"]) > start]
+    print(f"{args.count} grains: deepest {lowest - 0.06:.4f} m at {time - start:.4f} s, "
+          f"{ball[-1][1] - 0.06:.4f} m at the end; {sum(r['converged'] != '1' for r in steps)} of {len(steps)} steps "
+          f"of the impact missed, {sum(int(r['iterations']) for r in steps) / len(steps):.0f} sweeps a step; "
+          f"exit code {code}, {seconds:.0f} core-s")
+    return 0
+
+
 def compare_impact(data, results):
     ball = ball_of(results)
     references = curves(data / "impact-25k-ball.csv", "z")
@@ -393,10 +441,13 @@ def main():
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--only-compare", action="store_true")
     parser.add_argument("--seeds", type=int, default=0, metavar="N", help="impact: so many runs from shifted grains")
+    parser.add_argument("--count", type=int, default=0, metavar="N", help="impact: an own filling of N grains")
     args = parser.parse_args()
     scene, compare = CASES[args.case]
-    if args.seeds:
-        return impact_seeds(args) if args.case == "impact" else parser.error("--seeds is for the impact")
+    if (args.seeds or args.count) and args.case != "impact":
+        parser.error("--seeds and --count are for the impact")
+    if args.seeds or args.count:
+        return impact_count(args) if args.count else impact_seeds(args)
     if not args.only_compare:
         code, seconds = run(args, scene, args.out)
         print(f"exit code {code}, {seconds:.1f} core-seconds")
