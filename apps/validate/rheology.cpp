@@ -15,8 +15,9 @@ namespace talus::literature {
 
 CaseResult rheology_case(const Effort& effort) {
   CaseResult result;
-  const std::vector<double> rates =
-      effort.brief ? std::vector<double>{0.03, 0.3} : std::vector<double>{1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3};
+  const std::vector<double> rates = effort.brief
+                                        ? std::vector<double>{0.03, 0.3}
+                                        : std::vector<double>{1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3};
   const std::string jop = "Jop, Forterre & Pouliquen, Nature 441 (2006) 727: glass beads";
   std::vector<double> I, mu, phi;
   for (const double rate : rates) {
@@ -49,7 +50,7 @@ CaseResult rheology_case(const Effort& effort) {
   published.hue = 2;
   published.dash = 1;
   for (std::size_t k = 0; k < I.size(); ++k) found.points.push_back({I[k], mu[k]});
-  for (double x = 1e-3; x < 0.35; x *= 1.1) {
+  for (double x = rates.front(); x < 0.35; x *= 1.1) {
     line.points.push_back({x, mu_s + (mu_2 - mu_s) * part(x, fit.parameter)});
     published.points.push_back({x, 0.383 + 0.26 / (1 + 0.279 / x)});
   }
