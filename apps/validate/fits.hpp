@@ -31,6 +31,18 @@ inline Line fit_line(
   return line;
 }
 
+/// Standard error of the start of that line, from those of y, independent of one another.
+inline double error_of_start(
+    std::span<const double> x, std::span<const double> errors,
+    const std::function<double(double)>& g = [](double at) { return at; }) {
+  const auto n = static_cast<double>(x.size());
+  double sx = 0, sxx = 0, squares = 0;
+  for (const double at : x) sx += g(at), sxx += g(at) * g(at);
+  for (std::size_t k = 0; k < x.size(); ++k)
+    squares += std::pow((sxx - g(x[k]) * sx) / (n * sxx - sx * sx) * errors[k], 2);
+  return std::sqrt(squares);
+}
+
 /// The best line over a parameter of g, g(x, parameter), tried from `low` on in steps by a factor to `high`.
 struct CurveFit {
   Line line;
