@@ -24,9 +24,8 @@ struct CellRunParameters {
   double time_step = 0.03;
   /// Shear of a step, at most: fast flows take shorter steps ...
   double strain_of_step = 1e-3;
-  /// ... and, if that does not take steps longer than `longest`, at least: slow flows take longer ones.
+  /// ... and at least: flows slower than this over `time_step` take longer ones.
   double least_strain_of_step = 5e-6;
-  double longest = 0.1;
   /// Steps from row to row.
   std::int64_t every = 10;
 };
@@ -52,8 +51,8 @@ Stage press_stage(double friction, double rest, double most) {
 Stage shear_stage(double friction, double rate, double strain) {
   Stage stage;
   stage.name = "shear";
-  const double slow = std::min(parameters.longest, parameters.least_strain_of_step / rate);
-  stage.time_step = std::min(std::max(parameters.time_step, slow), parameters.strain_of_step / rate);
+  stage.time_step = std::clamp(parameters.time_step, parameters.least_strain_of_step / rate,
+                               parameters.strain_of_step / rate);
   stage.laws.set_all(&PairLaw::friction, friction);
   take_stress(stage);
   stage.shear_rates = {0, rate, 0};

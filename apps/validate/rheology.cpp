@@ -19,12 +19,13 @@ CaseResult rheology_case(const Effort& effort) {
                                         ? std::vector<double>{0.03, 0.3}
                                         : std::vector<double>{1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3};
   const std::string jop = "Jop, Forterre & Pouliquen, Nature 441 (2006) 727: glass beads";
-  std::vector<double> I, mu, phi;
+  std::vector<double> I, mu, errors, phi;
   for (const double rate : rates) {
     const Steady steady =
         flow({effort.brief ? 250 : 500, 0.4, 0.4, rate, rate < 2e-3 ? 0.6 : 1.5}, effort, result);
     I.push_back(rate);
     mu.push_back(steady.ratio.value);
+    errors.push_back(steady.ratio.error);
     phi.push_back(steady.solid_fraction.value);
     result.measures.push_back(
         {fmt::format("tau/p at I = {:g}", rate), steady.ratio.value, steady.ratio.error});
@@ -39,7 +40,8 @@ CaseResult rheology_case(const Effort& effort) {
   const auto part = [](double at, double I_0) { return 1 / (1 + I_0 / at); };
   const CurveFit fit = fit_curve(I, mu, 0.02, 3, part);
   const double mu_s = fit.line.start, mu_2 = fit.line.start + fit.line.slope;
-  result.measures.push_back({"mu_s of the fit", mu_s, 0, 0.30, 0.42, jop + " have 0.383"});
+  const double error = error_of_start(I, errors, [&](double at) { return part(at, fit.parameter); });
+  result.measures.push_back({"mu_s of the fit", mu_s, error, 0.30, 0.42, jop + " have 0.383"});
   result.measures.push_back({"mu_2 of the fit", mu_2});
   result.measures.push_back({"I_0 of the fit", fit.parameter});
   io::Chart chart = chart_of("rheology", "Shear ratio against the inertial number", "I", "tau/p");

@@ -56,8 +56,9 @@ CaseResult frictionless_shear_case(const Effort& effort) {
         {fmt::format("angle of slow shear by a power of {} [degrees]", power), angle.value, angle.error});
   }
   const Mean angle = slow_angle(power_of_source);
-  result.measures.push_back({"macroscopic angle of slow shear, by a power of 0.38 [degrees]", angle.value,
-                             angle.error, 5.46, 6.06, source});
+  result.measures.push_back(
+      {fmt::format("macroscopic angle of slow shear, by a power of {} [degrees]", power_of_source),
+       angle.value, angle.error, 5.46, 6.06, source});
   result.measures.push_back({"solid fraction at the slowest", slowest.solid_fraction.value,
                              slowest.solid_fraction.error, 0.63, 0.645,
                              "no dilatancy: that of the packing, 0.633 of 500 grains"});

@@ -58,7 +58,7 @@ struct CandidateGroup {
 /// groups.
 inline constexpr int longest_chunk = 1000;
 
-/// Bound so that 32 bits can tell where the record of a body begins (record_of).
+/// Bound so that 32 bits can tell where the record of a body begins (ContactBody).
 inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
 /// The candidates of a chunk are of several pairs of materials.

@@ -78,7 +78,7 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
   const auto first = std::span<const ContactBody>(contacts.first).subspan(begin, count),
              second = std::span<const ContactBody>(contacts.second).subspan(begin, count);
   std::vector<std::int64_t> contact(count);
-  static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
+  static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == record_numbers * sizeof(double));
   const std::vector<double> restitution = own_restitution(phase, first, second);
   const PairView pairs{in.x.data()->data(),
                        in.radius.data(),

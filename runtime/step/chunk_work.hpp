@@ -44,7 +44,7 @@ class ChunkWork {
   const Course& course(int epoch) const { return courses_.of(schedule_.sweep(epoch)); }
 
   const std::vector<ErrorSums>& errors() const { return errors_; }  ///< per chunk, of the last measure
-  /// Likewise the impulse of the contacts on a cell that follows a stress [N s]; empty without one.
+  /// Likewise the impulse of the contacts on a periodic cell [N s]; empty between walls.
   const std::vector<CellVelocity>& cell_impulses() const { return cell_impulses_; }
   /// Per chunk, with conjugate gradients: squared norm of the last sweep's change [J].
   const std::vector<double>& changes() const { return changes_; }

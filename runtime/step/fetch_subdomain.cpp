@@ -30,11 +30,12 @@ void fetch_subdomain(const StepState& state, const AccelerationHistory& accelera
       const std::size_t end = begin + static_cast<std::size_t>(contacts.count[c]);
       if (in_single)
         fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
-              single.rn, single.mu, single.reach, acceleration.steps.x, acceleration.steps.y,
-              acceleration.steps.z, acceleration.steps.n, contacts.first, contacts.second, contacts.group);
+              single.rn, single.mu, single.vx, single.vy, single.vz, single.reach, acceleration.steps.x,
+              acceleration.steps.y, acceleration.steps.z, acceleration.steps.n, contacts.first,
+              contacts.second, contacts.group);
       else
         fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
-              contacts.rz, contacts.rn, contacts.mu, contacts.reach);
+              contacts.rz, contacts.rn, contacts.mu, contacts.vx, contacts.vy, contacts.vz, contacts.reach);
     }
   fetch(first, last, state.single.velocity, state.single.last_v);
 }

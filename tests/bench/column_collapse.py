@@ -4,9 +4,10 @@
     tests/bench/column_collapse.py OUT [--talus build/release/talus] [--ratios 0.5,1,2,4,8] [--finer F]
                                    [--set KEY=VALUE ...]
 
-Runs apps/scenes/column-collapse.toml with a column of 0.1 m and as many grains as each ratio takes, and measures where the deposit ends: at
-the last x before which strips of two mean diameters hold at least half a layer of grains. --finer takes grains, the
-channel's width and time steps F times smaller, and so F^2 times as many grains. Published, for many
+Runs apps/scenes/column-collapse.toml with a column of 0.1 m and as many grains as each ratio takes, and measures
+where the deposit ends: in the middle of the first strip of two mean diameters, wherever it begins, that does not hold
+half a layer of grains. --finer takes grains, the channel's width and time steps F times smaller, and so F^2 times as
+many grains. Published, for many
 materials in a channel: (end - length)/length = 1.2 a below a = 2.3 and 1.9 a^(2/3) above 2.8. Needs h5py. Exit code 1
 where a runout is more than 10 % off.
 """

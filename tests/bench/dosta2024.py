@@ -312,7 +312,7 @@ def impact_seeds(args):
 
 
 def impact_count(args):
-    """A filling of `args.count` grains: how deep the ball gets, and when it is at rest."""
+    """A filling of `args.count` grains: how deep the ball gets, when, and where it is at the end."""
     code, seconds = run(args, impact_scene, args.out, count=args.count)
     if code not in (0, 3):
         return code

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Discharge of a silo with grains of 6 mm: Beverloo's law, the head, no friction, a mesh, and looser solutions.
+"""Discharge of a silo: Beverloo's law, two orifices, the head, no friction, a mesh, and looser solutions.
 
     tests/bench/silo.py published|ratio|orifices|head|fluid|mesh|tolerance OUT [--talus build/release/talus] [--set KEY=VALUE ...]
 
-The silo is that of Dosta et al. (2024) with its materials: a tube of radius 0.1 m over a funnel of 45 degrees. It is
+The silo is that of Dosta et al. (2024) with its materials: a tube of radius 0.1 m over a funnel of 45 degrees.
+`published` and `ratio` fill it with 100,000 grains of 4 mm for each orifice. For the others, with grains of 6 mm, it is
 filled once, on a funnel that goes on to a radius of 18 mm (OUT/fill-COUNT); each discharge begins from there, with the
 funnel cut off at its orifice: what stood below falls, the rest flows. The rate is the slope of the number of grains
 that have passed the orifice against time, from 0.2 s after the start until 55 % have left. Runs that stand in OUT with

@@ -147,6 +147,10 @@ TEST_F(CellsOnRanks, FollowAStressToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
   write(at("scene.toml"), stressed_cell);
   for (const int subdomains : {1, 2, 8})
     expect_same_bits(subdomains, {{1, 2}, {2, 1}}, fmt::format("stressed{}", subdomains));
+  const Outcome full =
+      run(1, "run scene.toml --out full --set decomposition.subdomains=1 --set solver.precision=double");
+  ASSERT_EQ(full.code, 0) << full.messages;
+  EXPECT_NE(digest_of("full"), digest_of("stressed1")) << "single precision was not used";
   expect_same_when_stopped(8, {70, 171}, "stressed8");
 }
 

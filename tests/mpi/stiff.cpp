@@ -80,7 +80,10 @@ TEST_F(StiffRanks, PutAColumnRightBehindTheLastSweepWithTheSameBitsOnAnyRanks) {
   grains(1, 60);
   for (const auto& [friction, subdomains] : {std::pair<std::string, int>{"0.35", 12}, {"0.0", 6}}) {
     scene("", friction, "max_iterations = 20\ntolerance = 1e-6");
-    ASSERT_EQ(run(1, "run scene.toml --threads 1 --out plain" + friction + " --set solver.method=nlgs").code,
+    ASSERT_EQ(run(1, fmt::format("run scene.toml --threads 1 --out plain{} --set solver.method=nlgs "
+                                 "--set decomposition.subdomains={}",
+                                 friction, subdomains))
+                  .code,
               3)
         << "the scene is to need more sweeps than it has";
     expect_same_bits(subdomains, {{2, 1}, {3, 1}}, "one" + friction);

@@ -27,7 +27,7 @@ template <std::same_as<Quad> V>
   return load<V>(pairs.x + 3 * i, 0, FirstLanes{3}) - load<V>(pairs.x + 3 * j, 0, FirstLanes{3});
 }
 [[gnu::always_inline]] inline Quad relative(const PairView& pairs, std::size_t i, std::size_t j) {
-  return load<Quad>(pairs.velocity + 8 * i) - load<Quad>(pairs.velocity + 8 * j);
+  return load<Quad>(pairs.velocity + record_numbers * i) - load<Quad>(pairs.velocity + record_numbers * j);
 }
 
 template <std::same_as<Quad> V>
