@@ -112,6 +112,17 @@ std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls) {
 
 namespace {
 
+std::string remedy_of_overlaps(const Tally& tally, const std::vector<Wall>& walls) {
+  if (const std::int64_t with = tally.deepest.overlapping->with; with < 0) {
+    const Wall& wall = walls[static_cast<std::size_t>(-1 - with)];
+    if (!wall.from_stage.empty())
+      return fmt::format(". That wall appears with stage '{}': if grains stood there, no time_step will do",
+                         wall.from_stage);
+  }
+  if (!(tally.sufficient_time_step > 0)) return "";
+  return fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step);
+}
+
 /// What came and went, and what found no room.
 void print_grains(const Terminal& terminal, const Simulation& simulation) {
   for (const InsertReport& insert : simulation.inserted()) {
@@ -155,9 +166,7 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         counted(static_cast<std::size_t>(tally.overlapped), "step"),
         simulation.setup().solver.overlap_tolerance, tally.deepest.overlap,
         name_of(*tally.deepest.overlapping, simulation.setup().walls), tally.deepest.step,
-        tally.sufficient_time_step > 0
-            ? fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step)
-            : "");
+        remedy_of_overlaps(tally, simulation.setup().walls));
   if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > 0)
     terminal.warn(
         "warning: of the steps that missed, step {} is the furthest off: at the contact of {} by {:.2g} of "
@@ -202,8 +211,10 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance);
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
-        "velocities of clusters too large for a direct solve: within {:.2g} of what their contacts exchange "
-        "(`velocity_error` in steps.csv); solver.velocity_tolerance bounds it",
+        "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "
+        "change in them in a step, at worst (`velocity_error` in steps.csv); solver.velocity_tolerance "
+        "bounds "
+        "it",
         summary.worst_velocity_error);
   terminal.say("results in {}", directory);
 }

@@ -286,6 +286,10 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
   const Tally& tally = all.memory.tally;
   tally.sum_up(simulation.report(), summary);
   summary.wall_s = memory.wall_s;
+  auto bodies = static_cast<std::int64_t>(summary.bodies);
+  for (const InsertReport& insert : simulation.inserted()) bodies += insert.placed;
+  for (const RemoveReport& remove : simulation.removed()) bodies -= remove.count;
+  summary.bodies_at_end = static_cast<std::size_t>(bodies);
   // The other ranks may wait for what will not come: the caller ends them when the files are whole.
   if (summary.status == "failed") return;
   if (trace) trace->finish(executor);

@@ -38,7 +38,8 @@ std::string sample_words(const io::SampleSpec& sample) {
       sample.grains() > 0 ? counted(static_cast<std::size_t>(sample.grains()), "grain") : "grains";
   switch (sample.kind) {
     case Kind::deposition:
-      return fmt::format("{} of {}, deposited layer by layer", grains, radii_of(sample.radii));
+      return fmt::format("{} of {}, deposited one by one, each in the lowest place", grains,
+                         radii_of(sample.radii));
     case Kind::lattice:
       return fmt::format("{} of {} on a lattice", grains, radii_of(sample.radii));
     case Kind::random:
@@ -53,7 +54,7 @@ std::string sample_words(const io::SampleSpec& sample) {
   return grains;
 }
 
-std::string load_words(const WallLoad& load) {
+std::string drive_words(const WallLoad& load) {
   switch (load.drive) {
     case WallDrive::fixed:
       return "is fixed";
@@ -67,9 +68,43 @@ std::string load_words(const WallLoad& load) {
   return "";
 }
 
+std::string load_words(const WallLoad& load) {
+  std::string text = drive_words(load);
+  if (load.pushed() && !load.velocity.isZero(0))
+    text += ", and moves along its face at " + io::detail::with_unit(load.velocity.norm(), "m/s");
+  return text;
+}
+
+std::string motion_words(const MotionPart& part) {
+  using Kind = MotionPart::Kind;
+  std::string text = part.surface_only ? "its surface " : "";
+  switch (part.kind) {
+    case Kind::velocity:
+      text += "moves at " + io::detail::with_unit(part.velocity.norm(), "m/s");
+      break;
+    case Kind::rotation:
+      text += fmt::format("turns at {:g} rad/s about ({:g}, {:g}, {:g})", part.rate, part.axis[0],
+                          part.axis[1], part.axis[2]);
+      break;
+    case Kind::oscillation:
+      text += fmt::format("swings by {} at {:g} 1/s along ({:g}, {:g}, {:g})",
+                          io::detail::with_unit(part.amplitude, "m"), part.frequency, part.direction[0],
+                          part.direction[1], part.direction[2]);
+      break;
+    case Kind::table:
+      text += "moves by the table " + part.file;
+      break;
+  }
+  if (!part.from_stage.empty()) text += ", from stage '" + part.from_stage + "' on";
+  if (!part.until_stage.empty()) text += ", until stage '" + part.until_stage + "'";
+  return text;
+}
+
 std::string wall_words(const Wall& wall) {
+  std::vector<std::string> motions;
+  for (const MotionPart& part : wall.motion) motions.push_back(motion_words(part));
   std::string text =
-      wall.shape.name + ", " + (wall.motion.empty() ? load_words(wall.load) : "moves by itself");
+      wall.shape.name + ", " + (motions.empty() ? load_words(wall.load) : joined(motions, " and "));
   if (!wall.from_stage.empty()) text += ", from stage '" + wall.from_stage + "' on";
   if (!wall.until_stage.empty()) text += ", until stage '" + wall.until_stage + "'";
   return text;
@@ -149,6 +184,17 @@ std::string insert_words(const InsertRule& insert) {
   return text;
 }
 
+std::string remove_words(const RemoveRule& remove, const io::Scene& scene) {
+  std::string text = "grains ";
+  if (remove.material) text += "of '" + scene.materials.at(*remove.material).name + "' ";
+  text += remove.region.kind == Region::Kind::beyond ? "beyond a plane"
+          : remove.region.is_round()                 ? "in a cylinder"
+                                                     : "in a box";
+  for (std::size_t k = 0; k < remove.at.size(); ++k)
+    text += (k == 0 ? ", at " : ", ") + io::detail::with_unit(remove.at[k], "s");
+  return text;
+}
+
 /// ", in a periodic cell of 1 m x 1 m, between 2 walls".
 std::string space_words(const Setup& setup) {
   std::string text;
@@ -186,6 +232,8 @@ HtmlSections scene_section(const RunFolder& run) {
     for (const io::SampleSpec& sample : scene.samples) rows.push_back({"sample", sample_words(sample)});
     for (const InsertRule& insert : scene.setup.inserts)
       rows.push_back({"insert '" + insert.name + "'", insert_words(insert)});
+    for (const RemoveRule& remove : scene.setup.removes)
+      rows.push_back({"remove '" + remove.name + "'", remove_words(remove, scene)});
     if (scene.density > 0) rows.push_back({"density", fmt::format("{:g} kg/m³", scene.density)});
     for (const io::MaterialSpec& material : scene.materials)
       rows.push_back({"material '" + material.name + "'", fmt::format("{:g} kg/m³", material.density)});
@@ -196,8 +244,9 @@ HtmlSections scene_section(const RunFolder& run) {
                                           scene.setup.solver.method.name(), scene.setup.solver.tolerance,
                                           scene.setup.solver.max_iterations)});
   }
-  if (const auto bodies = run.summary.value("bodies", std::size_t{0}); bodies > 0)
-    rows.push_back({"grains at the end", fmt::format("{}", bodies)});
+  if (run.summary.contains("bodies_at_end"))
+    rows.push_back(
+        {"grains at the end", fmt::format("{}", run.summary.value("bodies_at_end", std::size_t{0}))});
   for (const auto& warning : run.summary.value("warnings", nlohmann::json::array()))
     if (warning.is_string()) rows.push_back({"warning", warning.get<std::string>()});
   return {section};

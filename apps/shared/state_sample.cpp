@@ -39,6 +39,7 @@ StateSample state_of_frame(const io::Scene& scene) {
       file, spec.frame ? static_cast<std::size_t>(*spec.frame) : std::max<std::size_t>(frames, 1) - 1);
   StateSample state;
   state.walls = frame.walls;
+  state.clumps = io::holds_clumps(file);
   state.domain = frame.domain;
   for (std::size_t k = 0; k < frame.id.size(); ++k)
     add_body(frame.id[k], frame.x[k], frame.radius[k], frame.u[k],
@@ -110,6 +111,7 @@ StateSample state_of_checkpoint(const io::Scene& scene) {
     state.walls.push_back({wall.name, wall.normal.dot(point), wall.normal.dot(velocity), Vec3::Zero()});
   }
   state.domain = before.setup.domain;
+  state.clumps = !before.setup.clumps.empty();
   restore_cell(head, state.domain);
   std::vector<std::int32_t> subdomains(static_cast<std::size_t>(head.subdomains));
   std::iota(subdomains.begin(), subdomains.end(), 0);
@@ -159,7 +161,8 @@ StateSample read_state(const io::Scene& scene) {
   const bool checkpoint = io::is_checkpoint_name(name);
   if (checkpoint && scene.samples.front().frame) refuse("a checkpoint has no frames: leave `frame` out");
   StateSample state = checkpoint ? state_of_checkpoint(scene) : state_of_frame(scene);
-  if (!scene.setup.clumps.empty()) refuse("states of clumps cannot be begun from");
+  if (!scene.setup.clumps.empty() || state.clumps)
+    refuse("states of clumps cannot be begun from: begin with the sample that the run began with");
   if (!same_cell(state.domain, scene.setup.domain))
     refuse(fmt::format("it is of a run with {}, and the scene has {}: write the former",
                        words_of(state.domain), words_of(scene.setup.domain)));

@@ -17,6 +17,7 @@ struct StateSample {
   Domain domain;                   ///< of that run
   std::vector<WallReport> walls;   ///< of that run
   std::vector<GivenForce> forces;  ///< walls by their numbers in the new scene; of others left out
+  bool clumps = false;             ///< of that run
 };
 
 /// Reads the checkpoint or the frame that the scene names. Throws io::SceneError for clumps, where bodies are

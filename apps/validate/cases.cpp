@@ -7,6 +7,8 @@ const Registry<std::string_view, CaseMaker>& cases() {
       named("lattice", "a cubic lattice carries the stress of its cell exactly", lattice_case),
       named("free-cell", "an empty cell falls in as its mass says", free_cell_case),
       named("packing", "isotropic packing without friction", frictionless_packing_case),
+      named("packing-sizes", "isotropic packing of two sizes, 1 : 1.4, without friction",
+            packing_of_two_sizes_case),
       named("packing-0.3", "isotropic packing with friction 0.3", frictional_packing_case),
       named("shear-0", "slow shear without friction", frictionless_shear_case),
       named("critical-state", "slow shear with friction, from loose and from dense", critical_state_case),

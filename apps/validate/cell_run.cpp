@@ -86,12 +86,15 @@ StepCount run_to_end(const Setup& setup, Sample sample, int threads,
 }
 
 CellRun run_cell(const CellPlan& plan) {
-  constexpr double radius = 0.5;
   Sample sample;
   sample.density = 1;
-  sample.radius.assign(static_cast<std::size_t>(plan.grains), radius);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(plan.grains); ++k)
+    sample.radius.push_back(plan.radii[k % plan.radii.size()]);
   Setup setup;
-  const double volume = static_cast<double>(plan.grains) * std::numbers::pi / 6;
+  double cubes = 0;
+  for (const double radius : plan.radii)
+    cubes += std::pow(2 * radius, 3) / static_cast<double>(plan.radii.size());
+  const double volume = static_cast<double>(plan.grains) * std::numbers::pi / 6 * cubes;
   const double width = std::cbrt(volume / parameters.loose / plan.slender);
   setup.domain = periodic_domain({width, width, plan.slender * width});
   setup.stages = plan.stages;

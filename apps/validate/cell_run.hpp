@@ -1,7 +1,7 @@
 #pragma once
 
-/// Runs of equal spheres in a periodic cell. In units of their diameter, their density and the pressure, so
-/// that times are inertial times d (rho/p)^1/2 and a rate of shear is an inertial number.
+/// Runs of spheres in a periodic cell. In units of the diameter of equal ones, their density and the
+/// pressure, so that times are inertial times d (rho/p)^1/2 and a rate of shear is an inertial number.
 
 #include <cstdint>
 #include <functional>
@@ -23,7 +23,8 @@ struct CellPlan {
   std::uint64_t seed = 1;
   std::vector<Stage> stages;
   Effort effort;
-  double slender = 1;  ///< height of the cell over its width
+  double slender = 1;              ///< height of the cell over its width
+  std::vector<double> radii{0.5};  ///< dealt to the grains in turn
 };
 
 /// Presses with 1 along all axes, until the sample rests (StageEnd::equilibrium) or for `most` inertial

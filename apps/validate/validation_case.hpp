@@ -49,6 +49,7 @@ const Registry<std::string_view, CaseMaker>& cases();
 CaseResult lattice_case(const Effort& effort);
 CaseResult free_cell_case(const Effort& effort);
 CaseResult frictionless_packing_case(const Effort& effort);
+CaseResult packing_of_two_sizes_case(const Effort& effort);
 CaseResult frictional_packing_case(const Effort& effort);
 CaseResult frictionless_shear_case(const Effort& effort);
 CaseResult critical_state_case(const Effort& effort);

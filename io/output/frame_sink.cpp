@@ -15,6 +15,7 @@ class FrameSink : public OutputSink {
       names_.wall_materials.push_back(wall.material);
     }
     names_.materials = context.material_names;
+    names_.clumps = !context.clumps.empty();
   }
 
   void open() override { results_.emplace(path_, names_, ranks_, format_); }

@@ -160,6 +160,7 @@ ResultsWriter::ResultsWriter(const std::filesystem::path& path, const ResultsNam
       write_attribute(root, "format", std::string("talus-results"));
       write_attribute(root, "format_version", format_version);
       write_attribute(root, "talus_version", version());
+      if (names.clumps) write_attribute(root, "clumps", std::string("yes"));
       create_group(root, "frames");
       const Hdf5Object walls = create_group(root, "walls");
       write_names({walls.id(), path_}, "name", wall_names_);

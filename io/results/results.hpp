@@ -55,6 +55,7 @@ struct ResultsNames {
   std::vector<std::string> walls;
   std::vector<std::int64_t> wall_materials = {};  ///< numbers; empty where materials have no names
   std::vector<std::string> materials = {};        ///< by number; empty likewise
+  bool clumps = false;                            ///< bodies have shapes, which no frame holds
 
   ResultsNames() = default;
   ResultsNames(std::vector<std::string> wall_names) : walls(std::move(wall_names)) {}
@@ -96,6 +97,10 @@ class ResultsWriter {
   FrameFormat format_;
   std::size_t frames_ = 0;
 };
+
+/// Whether its bodies are clumps, of whose shapes frames have the bounding spheres only; files of
+/// earlier versions do not tell. Throws FileError when it is no results.h5.
+bool holds_clumps(const std::filesystem::path& path);
 
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);

@@ -120,6 +120,15 @@ std::size_t frame_count(const std::filesystem::path& path) {
   });
 }
 
+bool holds_clumps(const std::filesystem::path& path) {
+  const detail::QuietHdf5 quiet;
+  const std::string name = path.string();
+  return detail::rehearsed(name, instead_of_results, [&name] {
+    const Hdf5Object file = open_results(name);
+    return H5Aexists(file.id(), "clumps") > 0;
+  });
+}
+
 std::size_t demand_frames(const std::filesystem::path& path) {
   const std::size_t frames = frame_count(path);
   if (frames > 0) return frames;

@@ -133,6 +133,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"iterations", s.iterations},
       {"wall_s", s.wall_s},
       {"bodies", s.bodies},
+      {"bodies_at_end", s.bodies_at_end},
       {"frames", s.frames},
       {"warnings", s.warnings},
   };

@@ -75,9 +75,10 @@ struct Summary {
   std::optional<double> sufficient_time_step;  ///< [s] that would have kept them within it
   std::int64_t iterations = 0;                 ///< over all steps
   double wall_s = 0;                           ///< elapsed [s]
-  std::size_t bodies = 0;
-  std::vector<std::string> warnings = {};  ///< of the scene, said when the run began
-  std::size_t frames = 0;                  ///< output times
+  std::size_t bodies = 0;                      ///< with which it began
+  std::size_t bodies_at_end = 0;               ///< besides those that came, without those that went
+  std::vector<std::string> warnings = {};      ///< of the scene, said when the run began
+  std::size_t frames = 0;                      ///< output times
 };
 
 /// The text of run.json. Without a digest, as long as it runs and when it failed, that is null; so are

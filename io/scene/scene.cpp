@@ -27,6 +27,12 @@ namespace {
 
 using namespace detail;
 
+/// No strain comes from walls that neither move nor are pushed.
+bool stands_still(const std::vector<Wall>& walls, const std::vector<WallLoad>& loads) {
+  return std::ranges::all_of(loads, [](const WallLoad& load) { return load.drive == WallDrive::fixed; }) &&
+         std::ranges::all_of(walls, [](const Wall& wall) { return wall.motion.empty(); });
+}
+
 /// Reads the tables of one document into a Scene. Checks between keys stand where the nodes are at hand, for
 /// their lines.
 class SceneReader {
@@ -315,6 +321,12 @@ class SceneReader {
       if (node->as_table()->contains(key) && !flows)
         fail_at(*node, fmt::format("{}.{}", end_path, key),
                 "needs a periodic cell that flows in this stage: [cell], and rates or a stress");
+    const bool ends_else = end.steps || end.time || end.equilibrium || end.by_memory();
+    if (end.shear_strain && !flows && !ends_else)
+      fail_at(*node, end_path + ".shear_strain",
+              "the cell has no rates and no stress in this stage: it would never end");
+    if (end.strain && !flows && !ends_else && stands_still(scene_.setup.walls, in_force))
+      fail_at(*node, end_path + ".strain", "no wall moves or is pushed in this stage: it would never end");
     if (end.steady && !end.steady_time && !flows)
       fail_at(
           *node, end_path + ".steady",

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "kernels/bodies/record.hpp"
 #include "kernels/bodies/types.hpp"
 
 namespace talus {
@@ -18,7 +19,7 @@ namespace talus {
 /// where J = I_mean/R^2 stands in for I/R^2. So its energy is 1/2 J w^2 as that of a sphere, and all that
 /// only adds, averages or weighs velocities need not know what a body is.
 template <class Number>
-struct alignas(8 * sizeof(Number)) VelocityOf {
+struct alignas(record_numbers * sizeof(Number)) VelocityOf {
   Number u[3]{};           ///< velocity of the centre [m/s]
   Number inv_mass{};       ///< 1/m [1/kg]; 0 for a body that nothing moves
   Number w[3]{};           ///< R omega [m/s]
@@ -26,7 +27,8 @@ struct alignas(8 * sizeof(Number)) VelocityOf {
 };
 using Velocity = VelocityOf<double>;
 using SingleVelocity = VelocityOf<float>;  ///< mobilities in other units: single_precision.hpp
-static_assert(sizeof(Velocity) == 64 && sizeof(SingleVelocity) == 32);
+static_assert(sizeof(Velocity) == record_numbers * sizeof(double) &&
+              sizeof(SingleVelocity) == record_numbers * sizeof(float));
 
 /// The bodies of this process, one entry per slot. All arrays have the same length, except `orientation`,
 /// which is empty unless the scene asks for orientations or has clumps, `material`, unless it names

@@ -2,6 +2,7 @@
 
 /// Connected clusters of contacts: an error of one chain must not be hidden by the mean of a large sample.
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -40,6 +41,11 @@ struct SmallClusters {
   std::int32_t smooth = 500;    ///< the same where no contact has friction, and rounds settle
   std::int32_t loops = 100;     ///< of more bodies: loops at most, >= 0
   std::int32_t chained = 5000;  ///< and bodies at most, >= `bodies`
+
+  /// The same, none of more bodies than `most`.
+  SmallClusters within(std::int32_t most) const {
+    return {std::min(bodies, most), std::min(smooth, most), loops, std::min(chained, most)};
+  }
 };
 
 /// Per part and unknown, 1 in small clusters, else 0. `friction`: some contact may have it.

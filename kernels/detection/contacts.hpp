@@ -20,20 +20,20 @@ class ContactBody {
  public:
   ContactBody() = default;
   /// Implicit, as is the way back: it is a slot in another notation.
-  ContactBody(Slot slot) : place_(slot >= 0 ? numbers * to_unsigned(slot) : place_of_feature(-1 - slot)) {}
+  ContactBody(Slot slot)
+      : place_(slot >= 0 ? record_numbers * to_unsigned(slot) : place_of_feature(-1 - slot)) {}
   operator Slot() const {
-    const std::uint32_t in_record = place_ % numbers, record = place_ / numbers;
+    const std::uint32_t in_record = place_ % record_numbers, record = place_ / record_numbers;
     return in_record == 0 ? static_cast<Slot>(record)
-                          : -1 - static_cast<Slot>(record * (numbers - 1) + in_record - 1);
+                          : -1 - static_cast<Slot>(record * (record_numbers - 1) + in_record - 1);
   }
 
  private:
-  static constexpr std::uint32_t numbers = sizeof(Velocity) / sizeof(double);
-  static_assert(most_bodies_of_a_process * numbers <= std::size_t{1} << 32);
+  static_assert(most_bodies_of_a_process * record_numbers <= std::size_t{1} << 32);
   static std::uint32_t to_unsigned(Slot slot) { return static_cast<std::uint32_t>(slot); }
   static std::uint32_t place_of_feature(Slot feature) {
     const std::uint32_t of = to_unsigned(feature);
-    return of / (numbers - 1) * numbers + 1 + of % (numbers - 1);
+    return of / (record_numbers - 1) * record_numbers + 1 + of % (record_numbers - 1);
   }
 
   std::uint32_t place_ = 0;

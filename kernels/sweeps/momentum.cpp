@@ -33,7 +33,6 @@ void carry_numbers(Carry carry, double beta, double* values, std::array<double, 
     carry_one(carry, beta, values[k], last[k], step ? step + k : nullptr);
 }
 
-constexpr std::size_t record_numbers = sizeof(Velocity) / sizeof(double);
 using Record = std::array<double, record_numbers>;
 
 /// Masses, equal in both, come back to the bit: m - m = 0, 0 + m = m.

@@ -98,7 +98,7 @@ void validate_cell(const Setup& setup) {
     validate_stress(setup, stage);
   }
   if (!setup.domain.repeats) return;
-  const auto refuse = [](const std::string& what) { throw std::invalid_argument("cell: " + what); };
+  const auto refuse = [](const std::string& what) { throw std::invalid_argument(what); };
   for (const Wall& wall : setup.walls) {
     if (wall.surface() != nullptr)
       refuse(fmt::format("wall '{}' is no plane; a periodic cell has planes along its walled axes only",

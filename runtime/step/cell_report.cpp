@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "runtime/step/cell_flow.hpp"
@@ -20,26 +21,54 @@ std::array<double, 6> symmetric(const Mat3& m) {
       m(0, 0), m(1, 1), m(2, 2), (m(0, 1) + m(1, 0)) / 2, (m(0, 2) + m(2, 0)) / 2, (m(1, 2) + m(2, 1)) / 2};
 }
 
-}  // namespace
-
-Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {
-  // The same in any order: a run begins before its bodies are dealt out to subdomains.
+/// A body that counts here: its velocity against the flow [m/s] and its mass [kg].
+struct Moving {
+  Vec3 v;
+  double mass;
+};
+std::vector<Moving> against_flow(const StepState& state, const Mat3& gradient) {
   const Decomposition& all = state.decomposition;
-  std::vector<Mat3> moments;
-  double largest[1] = {0};
+  std::vector<Moving> bodies;
   for (std::size_t s = 0; s < state.bodies.size(); ++s) {
     if (!counts(all, s)) continue;
     const Velocity body = whole_velocity(all, state.bodies, s);
-    const Vec3 v = Eigen::Map<const Vec3>(body.u) - gradient * (state.bodies.x[s] - state.domain.low);
-    moments.emplace_back(v * v.transpose() / body.inv_mass);
-    largest[0] = std::max(largest[0], moments.back().trace());
+    bodies.push_back({Eigen::Map<const Vec3>(body.u) - gradient * (state.bodies.x[s] - state.domain.low),
+                      1 / body.inv_mass});
   }
-  ranks.max(largest);
-  std::vector<ExactSum> sums(9, ExactSum(largest[0]));
-  for (const Mat3& moment : moments)
-    for (std::size_t k = 0; k < 9; ++k) sums[k].add(moment.data()[k]);
+  return bodies;
+}
+
+/// The sum of the columns of all ranks, the same in any order: a run begins before its bodies are dealt out
+/// to subdomains.
+Eigen::VectorXd sum_over(const Eigen::MatrixXd& columns, const graph::Communicator& ranks) {
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(columns.rows());
+  if (columns.cols() > 0) largest = columns.cwiseAbs().rowwise().maxCoeff();
+  ranks.max(std::span(largest.data(), static_cast<std::size_t>(largest.size())));
+  std::vector<ExactSum> sums;
+  for (const double most : largest) sums.emplace_back(most);
+  for (Eigen::Index c = 0; c < columns.cols(); ++c)
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].add(columns(static_cast<Eigen::Index>(k), c));
   const std::vector<double> sum = all_over(sums, ranks);
-  return Eigen::Map<const Mat3>(sum.data());
+  return Eigen::Map<const Eigen::VectorXd>(sum.data(), static_cast<Eigen::Index>(sum.size()));
+}
+
+}  // namespace
+
+Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {
+  const std::vector<Moving> bodies = against_flow(state, gradient);
+  Eigen::MatrixXd rows(4, bodies.size());
+  for (std::size_t k = 0; k < bodies.size(); ++k)
+    rows.col(static_cast<Eigen::Index>(k)) << bodies[k].mass * bodies[k].v, bodies[k].mass;
+  const Eigen::VectorXd momentum_and_mass = sum_over(rows, ranks);
+  const double mass = momentum_and_mass[3];
+  const Vec3 mean = mass > 0 ? Vec3(momentum_and_mass.head<3>() / mass) : Vec3(Vec3::Zero());
+  rows.resize(9, rows.cols());
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    const Vec3 v = bodies[k].v - mean;
+    Eigen::Map<Mat3>(rows.col(static_cast<Eigen::Index>(k)).data()) = bodies[k].mass * (v * v.transpose());
+  }
+  const Eigen::VectorXd moment = sum_over(rows, ranks);
+  return Eigen::Map<const Mat3>(moment.data());
 }
 
 double stress_ratio(const Mat3& stress) {

@@ -7,8 +7,9 @@
 
 namespace talus {
 
-/// Sum of m v (x) v over the grains, v against the flow of the cell, of gradient G [1/s], in [J]: subdomain
-/// by subdomain, so that its bits are the same on any ranks. Collective.
+/// Sum of m v (x) v over the grains, v against the flow of the cell, of gradient G [1/s], and against the
+/// mean of all [J]: a sample that moves as a whole, or falls, presses nothing. The same bits on any ranks.
+/// Collective.
 Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks);
 
 /// q/p of a stress, or of anything in proportion to it: q = root of 3/2 s : s, s its deviator. 0 unless p >

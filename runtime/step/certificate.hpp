@@ -198,7 +198,7 @@ class Certificate {
   bool correctable() const;
   /// They were: what follows is a new start.
   void corrected();
-  const SmallClusters& small_clusters() const { return thresholds_.small; }
+  SmallClusters small_clusters() const { return thresholds_.small.within(settings_.direct_bodies); }
   /// The checks of large clusters look at the small ones, too.
   bool looks_twice() const { return settings_.balance_tolerance < thresholds_.finest_direct; }
   /// On the balance of small clusters.

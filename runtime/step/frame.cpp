@@ -53,31 +53,33 @@ BodyRow body_row(const StepState& state, std::size_t s) {
   return row;
 }
 
-/// A contact with an impulse: where it stands, and its chunk.
-struct Active {
+/// A contact with a force: where it stands, and its chunk.
+struct Acting {
   std::int32_t contact, chunk;
 };
 
-std::vector<Active> active_contacts(const StepState& state) {
-  std::vector<Active> active;
+/// Those that carry, and those that part and are pulled by cohesion alone.
+std::vector<Acting> acting_contacts(const StepState& state) {
+  std::vector<Acting> acting;
   for (std::size_t c = 0; c < state.chunks.size(); ++c) {
     const std::int32_t begin = state.chunks.begin[c];
     for (std::int32_t k = begin; k < begin + state.contacts.count[c]; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      if (is_active(state.contacts, at)) active.push_back({k, static_cast<std::int32_t>(c)});
+      if (is_active(state.contacts, at) || contact_impulse(state.contacts, at) != Vec3::Zero())
+        acting.push_back({k, static_cast<std::int32_t>(c)});
     }
   }
-  return active;
+  return acting;
 }
 
-ContactRow contact_row(const StepState& state, const Active& active, double impulse_time) {
+ContactRow contact_row(const StepState& state, const Acting& acting, double impulse_time) {
   const Bodies& bodies = state.bodies;
-  const auto k = static_cast<std::size_t>(active.contact);
+  const auto k = static_cast<std::size_t>(acting.contact);
   const Vec3 normal = contact_normal(state.contacts, k), impulse = contact_impulse(state.contacts, k);
   const auto i = static_cast<std::size_t>(state.contacts.first[k]);
   const Slot second = state.contacts.second[k];
   const auto j = static_cast<std::size_t>(std::max(second, 0));
-  const std::int32_t wall = state.chunks.wall[static_cast<std::size_t>(active.chunk)];
+  const std::int32_t wall = state.chunks.wall[static_cast<std::size_t>(acting.chunk)];
   const Touch touch = touch_of(poses_of(state), state.contacts, k,
                                wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)]);
   ContactRow row;
@@ -210,16 +212,16 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   permute_in_place(frame.orientation, by_id);
   permute_in_place(frame.material, by_id);
   if (!contacts) return;
-  std::vector<Active> active = active_contacts(state);
+  std::vector<Acting> acting = acting_contacts(state);
   const auto id_of_first = [&](std::size_t k) {
-    const auto contact = static_cast<std::size_t>(active[k].contact);
+    const auto contact = static_cast<std::size_t>(acting[k].contact);
     return static_cast<std::int64_t>(
         state.bodies.id[static_cast<std::size_t>(state.contacts.first[contact])]);
   };
-  reserve(rows_here(active.size(), dealing, id_of_first), frame.contact_bodies, frame.contact_normal,
+  reserve(rows_here(acting.size(), dealing, id_of_first), frame.contact_bodies, frame.contact_normal,
           frame.contact_point, frame.contact_gap, frame.contact_force);
   deal_rows(
-      active.size(), dealing, [&](std::size_t k) { return contact_row(state, active[k], impulse_time); },
+      acting.size(), dealing, [&](std::size_t k) { return contact_row(state, acting[k], impulse_time); },
       id_of_first,
       [&](const ContactRow& row) {
         frame.contact_bodies.push_back({row.bodies[0], row.bodies[1]});
@@ -228,7 +230,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
         frame.contact_gap.push_back(row.gap);
         frame.contact_force.push_back(vector_of(row.force));
       });
-  release(active);
+  release(acting);
   const std::vector<Slot> by_ids =
       ascending(std::span<const std::array<std::int64_t, 2>>(frame.contact_bodies));
   permute_in_place(frame.contact_bodies, by_ids);

@@ -180,7 +180,7 @@ struct CellReport {
   bool converged = true;             ///< of the step (StepReport)
 };
 
-/// State at an output time. The first vectors are per body, those named contact_ per active contact. On
+/// State at an output time. The first vectors are per body, those named contact_ per contact with a force. On
 /// several ranks each has a part: bodies in order of id, contacts in order of their ids, and rank after rank.
 struct Frame {
   std::int64_t step = 0;

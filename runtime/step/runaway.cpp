@@ -11,7 +11,7 @@ namespace talus {
 namespace {
 
 std::string describe(const Bodies& bodies, Slot slot) {
-  if (slot < 0) return "the fastest body is on another rank";
+  if (slot < 0) return "the fastest body is on another rank, or none has a speed that is a number";
   const auto s = static_cast<std::size_t>(slot);
   const Velocity& v = bodies.velocity[s];
   const Vec3& x = bodies.x[s];
@@ -54,7 +54,8 @@ namespace {
 /// A cell whose shear stress is more than its grains bear is sheared faster and faster.
 void check_strain(const StepState& state, double time_step, double most, const StepName& step) {
   if (!state.cell.loaded()) return;
-  const double strain = time_step * gradient_before(state.domain, 0).cwiseAbs().maxCoeff();
+  // Of the edges in the middle of the step: those of its end may be all but gone.
+  const double strain = time_step * gradient_before(state.domain, -time_step).cwiseAbs().maxCoeff();
   if (strain <= most) return;
   throw RunawayError(fmt::format(
       "{}: the stress strains the cell by {:.3g} in a step, more than {}. Reduce the time step, raise "
@@ -78,8 +79,7 @@ double cohesive_energy(const StepOutcome& outcome) {
 
 }  // namespace
 
-void check_for_runaway(const StepOutcome& outcome, double wall_energy_free,
-                       const RunawayThresholds& thresholds) {
+void check_for_runaway(const StepOutcome& outcome, double energy_free, const RunawayThresholds& thresholds) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
   const MotionSums& motion = sums.motion;
   if (result.diverged)
@@ -104,7 +104,7 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free,
   }
   const double energy = motion.energy.translation + motion.energy.rotation;
   const double supplied =
-      motion.energy_free + wall_energy_free + sample.total_mass * fastest_wall2 + cohesive_energy(outcome);
+      motion.energy_free + energy_free + sample.total_mass * fastest_wall2 + cohesive_energy(outcome);
   if (energy > thresholds.most_energy * supplied && energy > 0)
     throw RunawayError(
         fmt::format("{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "
@@ -112,10 +112,16 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free,
                     step.text(), energy, supplied, describe(state.bodies, motion.fastest)));
 }
 
-double free_energy_of(std::span<const Wall> walls) {
+double free_energy_of(const StepState& state) {
   double energy = 0;
-  for (const Wall& wall : walls)
+  for (const Wall& wall : state.walls)
     if (wall.load.pushed()) energy += 0.5 * wall.load.mass * (wall.velocity + wall.gain).squaredNorm();
+  const StressedCell& cell = state.cell;
+  const CellVelocity rates = components_of(state.flow.before);
+  for (std::size_t k = 0; k < cell_freedoms && cell.loaded(); ++k) {
+    const double velocity = cell.follows[k] ? cell.length * rates[k] + cell.push[k] / cell.mass : 0;
+    energy += 0.5 * cell.mass * velocity * velocity;
+  }
   return energy;
 }
 

@@ -2,11 +2,8 @@
 
 /// Checks for steps after which the run cannot go on.
 
-#include <span>
 #include <stdexcept>
-#include <vector>
 
-#include "kernels/shapes/walls.hpp"
 #include "runtime/step/step_report.hpp"
 
 namespace talus {
@@ -34,11 +31,12 @@ struct RunawayThresholds {
 double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
-/// or the kinetic energy is far above what was supplied. `wall_energy_free`: see free_energy_of [J].
-void check_for_runaway(const StepOutcome& outcome, double wall_energy_free,
+/// or the kinetic energy is far above what was supplied. `energy_free`: see free_energy_of [J].
+void check_for_runaway(const StepOutcome& outcome, double energy_free,
                        const RunawayThresholds& thresholds = {});
 
-/// Kinetic energy of the pushed walls with their free velocities, before a step [J].
-double free_energy_of(std::span<const Wall> walls);
+/// Kinetic energy of pushed walls, and of a cell that follows a stress, with their free velocities, before a
+/// step [J].
+double free_energy_of(const StepState& state);
 
 }  // namespace talus

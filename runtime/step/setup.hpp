@@ -159,6 +159,8 @@ struct SolverSettings {
     if (velocity_tolerance > 0) return velocity_tolerance;
     return (friction ? sliding_over_balance : 1) * balance_tolerance;
   }
+  /// Clusters of more bodies are judged by estimates alone, whatever SmallClusters allows, in [0, 5000].
+  int direct_bodies = 5000;
   /// On overlap: depth of a pair at the end of a step, beyond what it was given, over the smaller radius.
   double overlap_tolerance = 0.05;
   int max_iterations = 2000;  ///< sweeps per step, >= 1

@@ -77,10 +77,10 @@ const StepReport& Simulation::step() {
   const std::vector<NamedBody> named = impl_->named_now();
   impl_->named.begin_step(named, impl_->state, impl_->ranks);
   impl_->probes.begin_step(impl_->state);
-  const double wall_energy_free = free_energy_of(impl_->state.walls);
+  const double energy_free = free_energy_of(impl_->state);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
-  check_for_runaway(outcome, wall_energy_free);
+  check_for_runaway(outcome, energy_free);
   const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);

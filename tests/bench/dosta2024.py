@@ -447,6 +447,8 @@ def main():
     scene, compare = CASES[args.case]
     if (args.seeds or args.count) and args.case != "impact":
         parser.error("--seeds and --count are for the impact")
+    if args.seeds and args.count:
+        parser.error("--seeds shifts the published bed: it takes no --count")
     if args.seeds or args.count:
         return impact_count(args) if args.count else impact_seeds(args)
     if not args.only_compare:

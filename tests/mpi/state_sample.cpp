@@ -183,5 +183,25 @@ TEST_F(BegunInACell, AnotherCellThanThatOfTheStateIsRefused) {
   }
 }
 
+class StateOfClumps : public OnRanks {};
+
+/// Frames have their bounding spheres only: as grains these overlap.
+TEST_F(StateOfClumps, IsRefusedAlsoWhereTheSceneHasNone) {
+  const std::string rest =
+      "[material]\ndensity = 2600\n[[wall]]\nname = \"z-\"\nposition = 0\n"
+      "[[stage]]\ntime_step = 1e-3\nend = { steps = 2 }\n[checkpoint]\nevery_steps = 2\n";
+  write(at("rods.toml"), rest +
+                             "[sample]\nkind = \"lattice\"\nshape = \"dumbbell\"\ncells = [2, 2, 2]\nspacing "
+                             "= 1\nradius = 0.02\n");
+  ASSERT_EQ(run(1, "run rods.toml --out rods --threads 1").code, 0);
+  for (const std::string from : {"results.h5", "checkpoint_000002.h5"}) {
+    write(at("branch.toml"), rest + "[sample]\nkind = \"state\"\nfile = \"rods/" + from + "\"\n");
+    const Outcome branch = run(1, "run branch.toml --out branch --threads 1");
+    EXPECT_EQ(branch.code, 2) << from;
+    EXPECT_NE(branch.messages.find("states of clumps"), std::string::npos) << branch.messages;
+    EXPECT_FALSE(fs::exists(at("branch")));
+  }
+}
+
 }  // namespace
 }  // namespace talus::state_sample_test

@@ -90,7 +90,7 @@ struct Balance {
 };
 
 /// Written from docs/theory.md, "Cells under stress": grains have c = u - G (x - low) in the middle of the
-/// step, G the gradient before or behind it over the edges of the middle.
+/// step, G the gradient before or behind it over the edges of the middle, the mean of all included.
 Balance balance_of(const Moment& before, const Moment& behind, const Frame& frame, const Case& c, double h) {
   const Vec3 low(-3, 1, 0.5);
   const double inertia = 0.7 * grains * mass * diameter * diameter;
@@ -104,6 +104,7 @@ Balance balance_of(const Moment& before, const Moment& behind, const Frame& fram
   Balance out;
   std::vector<Vec3> x(grains), own_before(grains), own_behind(grains);
   Mat3 own = Mat3::Zero();
+  Vec3 together = Vec3::Zero();  // what all do together presses nothing
   for (std::size_t k = 0; k < grains; ++k) {
     const Vec3 x_before = before.x[k] + 0.5 * h * before.u[k];
     x[k] = behind.x[k] - 0.5 * h * behind.u[k];  // perhaps another image
@@ -115,7 +116,9 @@ Balance balance_of(const Moment& before, const Moment& behind, const Frame& fram
     out.gained += energy - 0.5 * mass * (a.squaredNorm() + 0.4 * before.w[k].squaredNorm());
     const Vec3 begin = before.u[k] - G_begin * (before.x[k] - low);
     own += mass * begin * begin.transpose();
+    together += begin / grains;
   }
+  own -= grains * mass * together * together.transpose();
   const auto of_cell = [&](const Mat3& gradient) {
     return 0.5 * inertia * follows.cwiseProduct(gradient).squaredNorm();
   };

@@ -30,6 +30,17 @@ TEST(Cohesion, GrainHangsFromACeilingThatHoldsItsWeightAndFallsFromAWeakerOne) {
   EXPECT_EQ(falls.wall_force(0)[2], 0);
 }
 
+/// What pulls at a grain in a step is in its frame, also where the contact parts.
+TEST(Cohesion, ThatDoesNotHoldIsAForceInTheFrameOfItsStep) {
+  const double c = 0.25 * weight;
+  Experiment run(hanging(1, c));
+  run.step();
+  const Frame frame = run.simulation().frame();
+  EXPECT_NEAR(frame.u.at(0)[2], -(weight - c) / mass * h, 1e-12);
+  ASSERT_EQ(frame.contact_force.size(), 1u);
+  EXPECT_NEAR(frame.contact_force[0][2], c, 1e-9 * weight);
+}
+
 /// Nothing is at work but what pulls the grains together: the trifle by which a step is off is no runaway.
 TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
   constexpr double r = 0.002;

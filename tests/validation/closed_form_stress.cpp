@@ -145,6 +145,35 @@ TEST(GasInACellUnderItsOwnStress, HoldsTheCell) {
   EXPECT_NEAR(run.simulation().state().domain.rates.zz, 0, 1e-12);
 }
 
+/// What all grains do together pushes nothing, however fast it is.
+TEST(GasThatFliesAsAWhole, HoldsTheCellAsOneThatStays) {
+  const double h = 1e-4;
+  Scene scene(h);
+  scene.setup.domain = periodic_domain(Vec3::Constant(1));
+  scene.setup.decomposition.coupling = Coupling::nscdd;
+  const Vec3 together(5, -3, 7);
+  scene.sphere({0.2, 0.2, 0.2}, radius, mass, together + Vec3(0, 0, 1));
+  scene.sphere({0.7, 0.7, 0.7}, radius, mass, together - Vec3(0, 0, 1));
+  scene.stage().stress.to[0] = 0;
+  scene.stage().stress.to[2] = 2 * mass;  // sum of m v_z^2 / V
+  Experiment run(std::move(scene));
+  run.steps(50);
+  EXPECT_NEAR(run.simulation().state().domain.cell.xx, 1, 1e-12);
+  EXPECT_NEAR(run.simulation().state().domain.cell.zz, 1, 1e-12);
+}
+
+/// So does free fall.
+TEST(LatticeThatFalls, CarriesTheStressOfItsCell) {
+  const double pressure = 1e3;
+  Scene scene = lattice(1e-3, 4);
+  for (std::size_t k = 0; k < 3; ++k) scene.stage().stress.to[k] = pressure;
+  scene.stage().gravity = {0, 0, -10};
+  Experiment run(std::move(scene));
+  for (int step = 0; step < 200; ++step) ASSERT_TRUE(run.step().converged) << "step " << step;
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(run.simulation().cell()->stress[k], pressure, 1e-6 * pressure);
+}
+
 /// Cohesion pulls at the cell, too: a lattice that a stress pulls apart holds up to it.
 TEST(CohesiveLattice, HoldsACellThatIsPulledApart) {
   const double pull = 900, strength = 1e3 * diameter * diameter;

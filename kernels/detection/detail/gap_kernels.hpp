@@ -7,19 +7,18 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "kernels/bodies/record.hpp"
 #include "kernels/detection/separation.hpp"
 
 namespace talus {
 
 struct GapRule;
 
-constexpr std::uint32_t record_numbers = 8;  ///< in the record of a body (VelocityOf)
-
 /// Pairs of grains whose gaps are to be found.
 struct PairView {
   const double* x;                      ///< 3 per body: its centre [m]
   const double* radius;                 ///< 1 per body [m]
-  const double* velocity;               ///< 8 per body: its record
+  const double* velocity;               ///< record_numbers per body: its record
   const std::uint32_t *first, *second;  ///< per pair: where the records of its bodies begin, in numbers
   std::size_t count;                    ///< of pairs
   const double* restitution = nullptr;  ///< per pair; null: all have that of the rule

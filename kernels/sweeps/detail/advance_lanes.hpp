@@ -3,6 +3,7 @@
 /// Momentum of bodies, 4 or 8 numbers at a time (kernels/sweeps/momentum.hpp): a value s becomes
 /// s + beta (s - last), and `last` becomes s.
 
+#include "kernels/bodies/record.hpp"
 #include "kernels/simd/lanes.hpp"
 
 namespace talus {
@@ -18,7 +19,7 @@ template <class V, class Number>
 /// Advances whole records: masses, equal in both, keep their bits.
 template <class V, class Number>
 void advance_bodies(Number* bodies, Number* last, const std::int32_t* slots, std::size_t count, double beta) {
-  constexpr std::size_t record = 8, ahead = 8;
+  constexpr std::size_t record = record_numbers, ahead = 8;
   for (std::size_t k = 0; k < count; ++k) {
     if (k + ahead < count) {
       __builtin_prefetch(bodies + record * static_cast<std::uint32_t>(slots[k + ahead]), 1);

@@ -54,7 +54,7 @@ template <class V, class Grains>
 [[gnu::always_inline]] inline V whole(const Grains& a, const std::uint32_t* begin, FirstLanes lanes,
                                       const std::uint16_t* parts) {
   V inv_mass = V{} + 1.0;
-  for (std::size_t l = 0; l < lanes.count; ++l) inv_mass[l] = a[l][3] / parts[begin[l] / record];
+  for (std::size_t l = 0; l < lanes.count; ++l) inv_mass[l] = a[l][3] / parts[begin[l] / record_numbers];
   return inv_mass;
 }
 

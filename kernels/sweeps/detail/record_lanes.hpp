@@ -4,14 +4,13 @@
 /// of kernels/sweeps/detail/sweep_lanes.hpp. A record is {u, 1/m | w, R^2/I}: one half for the velocity and
 /// its mobility, the other for the spin and its mobility.
 
+#include "kernels/bodies/record.hpp"
 #include "kernels/simd/contact_view.hpp"
 #include "kernels/simd/lanes.hpp"
 #include "kernels/simd/transpose.hpp"
 
 namespace talus {
 namespace {
-
-constexpr std::size_t record = 8;  ///< numbers of a body
 
 /// Number of lanes of V.
 template <class V>
@@ -39,7 +38,7 @@ template <class View, class Number>
 template <class V>
 struct SpareGrains {
   using Number = NumberOf<V>;
-  alignas(64) Number record_of[width_of<V>][record]{};
+  alignas(64) Number record_of[width_of<V>][record_numbers]{};
 
   [[gnu::always_inline]] explicit SpareGrains(const Number* velocity = nullptr) {
     for (auto& grain : record_of) {

@@ -150,6 +150,21 @@ TEST(SceneErrors, EquilibriumNeedsALoad) {
                  "loads the sample");
 }
 
+TEST(SceneErrors, StageWhoseEndNothingBringsAboutIsRefused) {
+  const std::string fixed = replaced(scene_with(), "drive = \"pressure\"\npressure = 1e4", "");
+  expect_refused(replaced(fixed, "steps = 5", "strain = 0.1"), "end = ", "stage[0].end.strain", "never end");
+  EXPECT_NO_THROW(parse_scene(replaced(fixed, "steps = 5", "strain = 0.1, time = 1"), file));
+  EXPECT_NO_THROW(parse_scene(replaced(scene_with(), "steps = 5", "strain = 0.1"), file));
+  const std::string cell = replaced(replaced(fixed, "box = true", ""), "[[wall]]\nname = \"z+\"\n",
+                                    "[cell]\nlengths = [0.2, 0.2, 0.2]\n");
+  const std::string still = replaced(replaced(cell, "deposition", "random"), "base = [0.1, 0.1]", "");
+  expect_refused(replaced(still, "steps = 5", "shear_strain = 0.1"), "end = ", "stage[0].end.shear_strain",
+                 "never end");
+  EXPECT_NO_THROW(parse_scene(
+      replaced(replaced(still, "steps = 5", "shear_strain = 0.1"), "#stage", "shear_rates = [0, 1, 0]"),
+      file));
+}
+
 TEST(SceneErrors, BrokenTomlIsRefusedWithItsLine) {
   const SceneError error = error_of("name = \"a\"\nseed = = 3\n");
   EXPECT_EQ(error.line(), 2);

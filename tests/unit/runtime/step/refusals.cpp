@@ -100,6 +100,20 @@ TEST(Runaway, OfAnOverflowStopsWithItsStepStageAndBody) {
   }
 }
 
+/// A cell that is pressed has as much to give as it would move by without contacts.
+TEST(Runaway, IsNoneOfWhatAStressedCellSupplies) {
+  StepState state;
+  state.cell.follows[0] = true;
+  state.cell.mass = 4;
+  state.cell.length = 0.5;
+  state.cell.push[0] = 2;
+  state.cell.push[1] = 100;  // prescribed: not a freedom
+  state.flow.before(0, 0) = 3;
+  EXPECT_DOUBLE_EQ(free_energy_of(state), 0.5 * 4 * (0.5 * 3 + 2.0 / 4) * (0.5 * 3 + 2.0 / 4));
+  state.cell.follows[0] = false;
+  EXPECT_EQ(free_energy_of(state), 0);
+}
+
 TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
   talus::Setup setup;
   setup.stages = {stage("release", 1)};
