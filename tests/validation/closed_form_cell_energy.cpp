@@ -119,7 +119,8 @@ Balance balance_of(const Moment& before, const Moment& behind, const Frame& fram
     own_behind[k] = b;
     own_begin[k] = before.u[k] - G_begin * (before.x[k] - low);
   }
-  for (std::vector<Vec3>* c : {&own_before, &own_behind, &own_begin}) leave_mean(*c);
+  for (std::vector<Vec3>* own_velocities : {&own_before, &own_behind, &own_begin})
+    leave_mean(*own_velocities);
   for (std::size_t k = 0; k < grains; ++k) {
     const double energy = 0.5 * mass * (own_behind[k].squaredNorm() + 0.4 * behind.w[k].squaredNorm());
     out.kinetic += energy;
