@@ -113,14 +113,13 @@ std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls) {
 namespace {
 
 std::string remedy_of_overlaps(const Tally& tally, const std::vector<Wall>& walls) {
-  if (const std::int64_t with = tally.deepest.overlapping->with; with < 0) {
-    const Wall& wall = walls[static_cast<std::size_t>(-1 - with)];
-    if (!wall.from_stage.empty())
-      return fmt::format(". That wall appears with stage '{}': if grains stood there, no time_step will do",
-                         wall.from_stage);
-  }
-  if (!(tally.sufficient_time_step > 0)) return "";
-  return fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step);
+  std::string text;
+  if (tally.sufficient_time_step > 0)
+    text = fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step);
+  const std::int64_t with = tally.deepest.overlapping->with;
+  if (with >= 0 || walls[static_cast<std::size_t>(-1 - with)].from_stage.empty()) return text;
+  return text + fmt::format("; but where grains stood as that wall appeared, in stage '{}', none will",
+                            walls[static_cast<std::size_t>(-1 - with)].from_stage);
 }
 
 /// What came and went, and what found no room.

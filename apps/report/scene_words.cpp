@@ -175,13 +175,23 @@ std::string stage_words(const Stage& stage) {
   return text;
 }
 
+/// ", in stage 'drain', from 1 s until 2 s, every 10 ms".
+std::string times_words(const RuleTimes& times) {
+  std::string text;
+  if (!times.stage.empty()) text += ", in stage '" + times.stage + "'";
+  if (times.from > 0) text += ", from " + io::detail::with_unit(times.from, "s");
+  if (std::isfinite(times.until)) text += ", until " + io::detail::with_unit(times.until, "s");
+  if (times.interval > 0) text += ", every " + io::detail::with_unit(times.interval, "s");
+  return text;
+}
+
 std::string insert_words(const InsertRule& insert) {
   std::string text = "spheres of " + radii_of(insert.radii);
   if (insert.rate) text += fmt::format(", {:g} a second", *insert.rate);
   if (insert.mass_rate) text += fmt::format(", {:g} kg a second", *insert.mass_rate);
   if (insert.count) text += fmt::format(", {} in all", *insert.count);
   if (insert.mass) text += fmt::format(", {:g} kg in all", *insert.mass);
-  return text;
+  return text + times_words(insert.times);
 }
 
 std::string remove_words(const RemoveRule& remove, const io::Scene& scene) {
@@ -192,7 +202,7 @@ std::string remove_words(const RemoveRule& remove, const io::Scene& scene) {
                                                      : "in a box";
   for (std::size_t k = 0; k < remove.at.size(); ++k)
     text += (k == 0 ? ", at " : ", ") + io::detail::with_unit(remove.at[k], "s");
-  return text;
+  return text + times_words(remove.times);
 }
 
 /// ", in a periodic cell of 1 m x 1 m, between 2 walls".
@@ -244,9 +254,9 @@ HtmlSections scene_section(const RunFolder& run) {
                                           scene.setup.solver.method.name(), scene.setup.solver.tolerance,
                                           scene.setup.solver.max_iterations)});
   }
-  if (run.summary.contains("bodies_at_end"))
-    rows.push_back(
-        {"grains at the end", fmt::format("{}", run.summary.value("bodies_at_end", std::size_t{0}))});
+  if (const auto bodies = run.summary.find("bodies_at_end");
+      bodies != run.summary.end() && bodies->is_number_unsigned())
+    rows.push_back({"grains at the end", fmt::format("{}", bodies->get<std::size_t>())});
   for (const auto& warning : run.summary.value("warnings", nlohmann::json::array()))
     if (warning.is_string()) rows.push_back({"warning", warning.get<std::string>()});
   return {section};

@@ -30,7 +30,11 @@ std::optional<Frame> last_frame(const RunFolder& run) {
   try {
     const std::filesystem::path results = run.directory / "results.h5";
     const std::size_t frames = std::filesystem::exists(results) ? io::frame_count(results) : 0;
-    const std::size_t grains = run.summary.value("bodies", std::size_t{0});
+    const auto count = [&](const char* key) {
+      const auto found = run.summary.find(key);
+      return found != run.summary.end() && found->is_number_unsigned() ? found->get<std::size_t>() : 0;
+    };
+    const std::size_t grains = std::max(count("bodies"), count("bodies_at_end"));
     if (frames == 0 || grains > most_drawn) return std::nullopt;
     // Forces are shown by the live view only.
     return io::read_frame(results, frames - 1,

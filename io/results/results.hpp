@@ -13,8 +13,8 @@
 ///                                has moved that is no plane rotation [w,9], translation [w,3]
 ///   /frames/000000/cell          of a periodic cell: origin [3], edges [3,3], rates [3,3], an edge a row
 ///
-/// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain
-/// unless FrameFormat says otherwise. Rank 0 lays a frame out, and every rank writes its rows at their
+/// n bodies, m contacts with a force, w walls; every dataset has an attribute `units`. Arrays are stored
+/// plain unless FrameFormat says otherwise. Rank 0 lays a frame out, and every rank writes its rows at their
 /// places, beside HDF5: its own parallel writing is collective, and a rank whose disk is full would leave the
 /// others waiting in H5Fclose (docs/decisions/0025-checkpoints.md). Compressed rows all go through rank 0.
 ///

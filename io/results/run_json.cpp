@@ -113,6 +113,8 @@ std::string run_json(const Provenance& p, const Summary& s) {
   if (s.digest) digest = fmt::format("{:016x}", *s.digest);
   nlohmann::ordered_json sufficient;  // null
   if (s.sufficient_time_step) sufficient = *s.sufficient_time_step;
+  nlohmann::ordered_json bodies_at_end;  // null
+  if (s.bodies_at_end) bodies_at_end = *s.bodies_at_end;
   root["summary"] = {
       {"status", s.status},
       {"message", s.message},
@@ -133,7 +135,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"iterations", s.iterations},
       {"wall_s", s.wall_s},
       {"bodies", s.bodies},
-      {"bodies_at_end", s.bodies_at_end},
+      {"bodies_at_end", bodies_at_end},
       {"frames", s.frames},
       {"warnings", s.warnings},
   };

@@ -76,7 +76,7 @@ struct Summary {
   std::int64_t iterations = 0;                 ///< over all steps
   double wall_s = 0;                           ///< elapsed [s]
   std::size_t bodies = 0;                      ///< with which it began
-  std::size_t bodies_at_end = 0;               ///< besides those that came, without those that went
+  std::optional<std::size_t> bodies_at_end;    ///< with those that came, without those that went; once known
   std::vector<std::string> warnings = {};      ///< of the scene, said when the run began
   std::size_t frames = 0;                      ///< output times
 };

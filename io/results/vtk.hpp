@@ -28,7 +28,7 @@ struct GrainField {
 /// body.
 std::string grains_vtp(const Frame& frame, std::span<const GrainField> fields = {});
 
-/// Text of a .vtp file with one line per active contact: between the centres of its grains, or from the
+/// Text of a .vtp file with one line per contact with a force: between the centres of its grains, or from the
 /// centre to the contact point at a wall. Lines do not share points, so that a Tube filter can take its
 /// radius from the point data normal_force [N]; cell data force [N] on the first body, gap [m], wall (index
 /// of the wall, -1 between grains). Throws std::invalid_argument when a contact names a body that the frame

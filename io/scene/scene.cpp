@@ -322,7 +322,7 @@ class SceneReader {
         fail_at(*node, fmt::format("{}.{}", end_path, key),
                 "needs a periodic cell that flows in this stage: [cell], and rates or a stress");
     const bool ends_else = end.steps || end.time || end.equilibrium || end.by_memory();
-    if (end.shear_strain && !flows && !ends_else)
+    if (end.shear_strain && !flows && !ends_else && !end.strain)
       fail_at(*node, end_path + ".shear_strain",
               "the cell has no rates and no stress in this stage: it would never end");
     if (end.strain && !flows && !ends_else && stands_still(scene_.setup.walls, in_force))

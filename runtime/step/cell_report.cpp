@@ -32,6 +32,7 @@ std::vector<Moving> against_flow(const StepState& state, const Mat3& gradient) {
   for (std::size_t s = 0; s < state.bodies.size(); ++s) {
     if (!counts(all, s)) continue;
     const Velocity body = whole_velocity(all, state.bodies, s);
+    if (body.inv_mass == 0) continue;
     bodies.push_back({Eigen::Map<const Vec3>(body.u) - gradient * (state.bodies.x[s] - state.domain.low),
                       1 / body.inv_mass});
   }

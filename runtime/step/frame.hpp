@@ -168,7 +168,7 @@ struct CellReport {
   std::string stage;
   std::array<double, 6> edges{};           ///< PeriodicSpace [m]
   std::array<double, 6> stress{};          ///< of the contacts, mean over the step (Love-Weber) [Pa]
-  std::array<double, 6> kinetic_stress{};  ///< sum of m v (x) v over the volume, v against the flow [Pa]
+  std::array<double, 6> kinetic_stress{};  ///< kinetic_moment over the volume [Pa]
   double p = 0, q = 0, q_over_p = 0;  ///< of the contacts: mean stress, root of 3/2 s : s, s its deviator
   double solid_fraction = 0;
   double contacts_a_grain = 0;       ///< active contacts per grain, over all grains

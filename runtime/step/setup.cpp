@@ -226,6 +226,7 @@ void validate(const Setup& setup) {
   require(setup.solver.overlap_tolerance > 0,
           fmt::format("solver.overlap_tolerance must be > 0, got {}", setup.solver.overlap_tolerance));
   require(setup.solver.max_iterations >= 1, "solver.max_iterations must be >= 1");
+  require(setup.solver.direct_bodies >= 0, "solver.direct_bodies must be >= 0");
   require(
       setup.solver.method != SolverMethod::momentum || setup.decomposition.coupling != Coupling::schwarz,
       "solver.method = \"nlgs+momentum\": Schwarz adds up what all copies of a body carry on, and diverges. "

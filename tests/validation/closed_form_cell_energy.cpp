@@ -90,7 +90,7 @@ struct Balance {
   double pushed = 0;                        ///< |work| of all of these
 };
 
-void leave_mean(std::vector<Vec3>& velocities) {
+void take_out_mean(std::vector<Vec3>& velocities) {
   Vec3 mean = Vec3::Zero();
   for (const Vec3& v : velocities) mean += v / grains;
   for (Vec3& v : velocities) v -= mean;
@@ -120,7 +120,7 @@ Balance balance_of(const Moment& before, const Moment& behind, const Frame& fram
     own_begin[k] = before.u[k] - G_begin * (before.x[k] - low);
   }
   for (std::vector<Vec3>* own_velocities : {&own_before, &own_behind, &own_begin})
-    leave_mean(*own_velocities);
+    take_out_mean(*own_velocities);
   for (std::size_t k = 0; k < grains; ++k) {
     const double energy = 0.5 * mass * (own_behind[k].squaredNorm() + 0.4 * behind.w[k].squaredNorm());
     out.kinetic += energy;
@@ -203,7 +203,7 @@ TEST(PressedCell, LosesItsEnthalpyToItsContacts) {
   std::vector<double> errors;
   for (const double h : {1e-3, 1.25e-4}) {
     Scene scene = scene_of(c, h);
-    // Less is below what rounding leaves in some of 2400 steps.
+    // With less some of 2400 steps miss by rounding; the sums below do not hang on either.
     scene.setup.solver.tolerance = 1e-11;
     scene.setup.solver.balance_tolerance = 1e-6;
     Experiment run(std::move(scene));

@@ -162,7 +162,7 @@ TEST(GasThatFliesAsAWhole, HoldsTheCellAsOneThatStays) {
   EXPECT_NEAR(run.simulation().state().domain.cell.zz, 1, 1e-12);
 }
 
-/// So does free fall.
+/// Nor does free fall.
 TEST(LatticeThatFalls, CarriesTheStressOfItsCell) {
   const double pressure = 1e3;
   Scene scene = lattice(1e-3, 4);

@@ -72,6 +72,9 @@ TEST_F(Grains, TablesCountWhatCameAndWent) {
   EXPECT_GT(went.number(398, "count"), 0);
   EXPECT_NEAR(went.number(398, "mass") / went.number(398, "count"), 4.0 / 3 * M_PI * 1.25e-7 * 2500, 1e-12);
   EXPECT_NE(outcome.messages.find("insert 'glass': 60 grains placed"), std::string::npos) << outcome.messages;
+  const nlohmann::json said = summary(at("out"));
+  EXPECT_EQ(said["bodies_at_end"].get<double>(),
+            said["bodies"].get<double>() + 100 - went.number(398, "count") - went.number(399, "count"));
 }
 
 TEST_F(Grains, ARunThatWasStoppedGoesOnToTheSameBitsAndTables) {
@@ -80,6 +83,7 @@ TEST_F(Grains, ARunThatWasStoppedGoesOnToTheSameBitsAndTables) {
     ASSERT_EQ(run(rain, "--force --out parts --steps 70 --set checkpoint.every_steps=70" + more).code, 0);
     ASSERT_EQ(run(rain, "--out parts --resume" + more).code, 0);
     EXPECT_EQ(summary(at("whole"))["digest"], summary(at("parts"))["digest"]);
+    EXPECT_EQ(summary(at("whole"))["bodies_at_end"], summary(at("parts"))["bodies_at_end"]);
     for (const char* table : {"inserted.csv", "removed.csv"})
       EXPECT_EQ(content(at("whole") / table), content(at("parts") / table));
   }

@@ -129,7 +129,7 @@ class Frame:
 
     @cached_property
     def contacts(self) -> np.ndarray:
-        """Ids of the two bodies of each active contact; the second is -(1 + k) at wall k; shape (m, 2)."""
+        """Ids of the two bodies of each contact with a force; the second is -(1 + k) at wall k; shape (m, 2)."""
         return self.array("contacts/bodies")
 
     @cached_property

@@ -158,6 +158,18 @@ BodyProblem lattice(int nx, int ny, int nz) {
   return problem;
 }
 
+TEST(SmallClusters, OfNoMoreBodiesThanAskedAreNoChainsNorSmoothOnesEither) {
+  const SmallClusters given, few = given.within(150), none = given.within(0);
+  const auto is_small = [](const SmallClusters& small, int columns, int rows, bool friction) {
+    const BodyProblem problem = lattice(columns, 1, rows);
+    const test::Cut cut(problem, std::vector<std::int32_t>(problem.contacts.size(), 0), 1);
+    const std::vector<ContactGraph> graphs{graph_of(cut.parts[0])};
+    return in_small_clusters(clusters_of(graphs, cut), small, friction)[0][0] != 0;
+  };
+  EXPECT_TRUE(is_small(given, 1, 200, true) && is_small(given, 1, 400, false) && is_small(few, 1, 150, true));
+  EXPECT_FALSE(is_small(few, 1, 151, true) || is_small(few, 1, 151, false) || is_small(none, 1, 1, true));
+}
+
 TEST(SmallClusters, AreThoseOfFewBodiesAndChainsHoweverTheyAreCut) {
   constexpr SmallClusters small{.bodies = 20, .smooth = 30, .loops = 10, .chained = 300};
   struct Case {

@@ -225,7 +225,8 @@ Setup pushed(std::int64_t steps) {
 }
 
 TEST(PeriodicRun, ForcesUnderAStressDoNotDependOnWhereTheFacesLie) {
-  const talus::Setup setup = pushed(60);
+  talus::Setup setup = pushed(60);
+  setup.solver.tolerance = 1e-12;  // collisions amplify what it leaves by 10^5
   const std::map<BodyId, Vec3> one = against_flow(setup, Vec3::Zero());
   double scale = 0;
   for (const auto& [id, u] : one) scale = std::max(scale, u.norm());
@@ -234,7 +235,7 @@ TEST(PeriodicRun, ForcesUnderAStressDoNotDependOnWhereTheFacesLie) {
     const std::map<BodyId, Vec3> other = against_flow(setup, shift);
     double worst = 0;
     for (const auto& [id, u] : one) worst = std::max(worst, (other.at(id) - u).norm());
-    EXPECT_LT(worst, 1e-5 * scale) << shift.transpose();
+    EXPECT_LT(worst, 1e-6 * scale) << shift.transpose();
   }
 }
 
