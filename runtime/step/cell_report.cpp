@@ -39,37 +39,53 @@ std::vector<Moving> against_flow(const StepState& state, const Mat3& gradient) {
   return bodies;
 }
 
-/// The sum of the columns of all ranks, the same in any order: a run begins before its bodies are dealt out
-/// to subdomains.
-Eigen::VectorXd sum_over(const Eigen::MatrixXd& columns, const graph::Communicator& ranks) {
-  Eigen::VectorXd largest = Eigen::VectorXd::Zero(columns.rows());
-  if (columns.cols() > 0) largest = columns.cwiseAbs().rowwise().maxCoeff();
-  ranks.max(std::span(largest.data(), static_cast<std::size_t>(largest.size())));
-  std::vector<ExactSum> sums;
-  for (const double most : largest) sums.emplace_back(most);
-  for (Eigen::Index c = 0; c < columns.cols(); ++c)
-    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].add(columns(static_cast<Eigen::Index>(k), c));
-  const std::vector<double> sum = all_over(sums, ranks);
-  return Eigen::Map<const Eigen::VectorXd>(sum.data(), static_cast<Eigen::Index>(sum.size()));
+/// The sums over the rows of all ranks, none of whose numbers is beyond `largest`: the same in any order, as
+/// a run begins before its bodies are dealt out to subdomains.
+template <std::size_t N>
+std::vector<double> sums_over(std::span<const std::array<double, N>> rows, double largest,
+                              const graph::Communicator& ranks) {
+  std::vector<ExactSum> sums(N, ExactSum(largest));
+  for (const std::array<double, N>& row : rows)
+    for (std::size_t k = 0; k < N; ++k) sums[k].add(row[k]);
+  return all_over(sums, ranks);
+}
+
+/// The mean of the velocities, by mass [m/s]. Collective.
+Vec3 mean_of(const std::vector<Moving>& bodies, const graph::Communicator& ranks) {
+  double most[2] = {0, 0};  // component, mass
+  for (const auto& [v, mass] : bodies) {
+    most[0] = std::max(most[0], v.cwiseAbs().maxCoeff());
+    most[1] = std::max(most[1], mass);
+  }
+  ranks.max(most);
+  const auto& [fastest, heaviest] = most;
+  if (!(fastest > 0)) return Vec3::Zero();
+  std::vector<std::array<double, 4>> rows;
+  rows.reserve(bodies.size());
+  for (const auto& [v, mass] : bodies)
+    rows.push_back({mass * v[0], mass * v[1], mass * v[2], mass * fastest});
+  const std::vector<double> sum = sums_over<4>(rows, heaviest * fastest, ranks);
+  return fastest / sum[3] * Vec3(sum.data());
 }
 
 }  // namespace
 
 Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {
   const std::vector<Moving> bodies = against_flow(state, gradient);
-  Eigen::MatrixXd rows(4, bodies.size());
-  for (std::size_t k = 0; k < bodies.size(); ++k)
-    rows.col(static_cast<Eigen::Index>(k)) << bodies[k].mass * bodies[k].v, bodies[k].mass;
-  const Eigen::VectorXd momentum_and_mass = sum_over(rows, ranks);
-  const double mass = momentum_and_mass[3];
-  const Vec3 mean = mass > 0 ? Vec3(momentum_and_mass.head<3>() / mass) : Vec3(Vec3::Zero());
-  rows.resize(9, rows.cols());
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    const Vec3 v = bodies[k].v - mean;
-    Eigen::Map<Mat3>(rows.col(static_cast<Eigen::Index>(k)).data()) = bodies[k].mass * (v * v.transpose());
+  const Vec3 mean = mean_of(bodies, ranks);
+  std::vector<std::array<double, 6>> rows;
+  rows.reserve(bodies.size());
+  double largest[1] = {0};
+  for (const auto& [whole, mass] : bodies) {
+    const Vec3 v = whole - mean, p = mass * v;
+    rows.push_back({p[0] * v[0], p[1] * v[1], p[2] * v[2], p[0] * v[1], p[0] * v[2], p[1] * v[2]});
+    largest[0] = std::max(largest[0], p.dot(v));
   }
-  const Eigen::VectorXd moment = sum_over(rows, ranks);
-  return Eigen::Map<const Mat3>(moment.data());
+  ranks.max(largest);
+  const std::vector<double> sum = sums_over<6>(rows, largest[0], ranks);
+  Mat3 moment;
+  moment << sum[0], sum[3], sum[4], sum[3], sum[1], sum[5], sum[4], sum[5], sum[2];
+  return moment;
 }
 
 double stress_ratio(const Mat3& stress) {
