@@ -59,13 +59,12 @@ Vec3 mean_of(const std::vector<Moving>& bodies, const graph::Communicator& ranks
   }
   ranks.max(most);
   const auto& [fastest, heaviest] = most;
-  if (!(fastest > 0)) return Vec3::Zero();
   std::vector<std::array<double, 4>> rows;
   rows.reserve(bodies.size());
   for (const auto& [v, mass] : bodies)
     rows.push_back({mass * v[0], mass * v[1], mass * v[2], mass * fastest});
   const std::vector<double> sum = sums_over<4>(rows, heaviest * fastest, ranks);
-  return fastest / sum[3] * Vec3(sum.data());
+  return sum[3] > 0 ? Vec3(fastest / sum[3] * Vec3(sum.data())) : Vec3(Vec3::Zero());
 }
 
 }  // namespace

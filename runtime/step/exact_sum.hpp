@@ -12,10 +12,11 @@
 namespace talus {
 
 /// The sum over all ranks of one number per body, the same for any order: the terms are cut into integers of
-/// 31 bits, relative to the largest. What is cut off is below 2^-62 of the largest term.
+/// 31 bits, relative to the largest. What is cut off is below 2^-62 of the largest term. Terms of no more
+/// than 2^-990, whose scale would not be finite, are summed as 0.
 class ExactSum {
  public:
-  explicit ExactSum(double largest) : scale_(largest > 0 ? std::exp2(30 - std::ilogb(largest)) : 0) {}
+  explicit ExactSum(double largest) : scale_(largest > 0x1p-990 ? std::exp2(30 - std::ilogb(largest)) : 0) {}
   void add(double term) {
     const double scaled = term * scale_, high = std::floor(scaled);
     parts_[0] += static_cast<std::int64_t>(high);

@@ -162,6 +162,22 @@ TEST(GasThatFliesAsAWhole, HoldsTheCellAsOneThatStays) {
   EXPECT_NEAR(run.simulation().state().domain.cell.zz, 1, 1e-12);
 }
 
+/// Velocities whose squares are less than any number are no harm.
+TEST(GasThatHardlyMoves, LeavesTheCellAsItIs) {
+  for (const double speed : {1e-150, 1e-158, 1e-200, 1e-320}) {
+    Scene scene(1e-4);
+    scene.setup.domain = periodic_domain(Vec3::Constant(1));
+    scene.setup.decomposition.coupling = Coupling::nscdd;
+    scene.sphere({0.2, 0.2, 0.2}, radius, mass, {0, 0, speed});
+    scene.sphere({0.7, 0.7, 0.7}, radius, mass, {0, 0, -speed});
+    scene.stage().stress.to[2] = 0;
+    Experiment run(std::move(scene));
+    run.steps(3);
+    EXPECT_EQ(run.simulation().state().domain.cell.zz, 1) << speed;
+    EXPECT_LT(std::abs(run.simulation().cell()->kinetic_stress[2]), 1e-290) << speed;
+  }
+}
+
 /// Nor does free fall.
 TEST(LatticeThatFalls, CarriesTheStressOfItsCell) {
   const double pressure = 1e3;
