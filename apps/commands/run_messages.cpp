@@ -211,9 +211,8 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "
-        "change in them in a step, at worst (`velocity_error` in steps.csv); solver.velocity_tolerance "
-        "bounds "
-        "it",
+        "change in them in a step, at worst (`velocity_error` in steps.csv); "
+        "solver.velocity_tolerance bounds it",
         summary.worst_velocity_error);
   terminal.say("results in {}", directory);
 }

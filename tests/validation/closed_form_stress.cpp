@@ -130,16 +130,21 @@ TEST(CellUnderMoreShearThanItBears, EndsWithAReason) {
   }
 }
 
-/// A gas pushes back: with the stress that it has, the cell stays as it is.
-TEST(GasInACellUnderItsOwnStress, HoldsTheCell) {
-  const double h = 1e-4;
-  Scene scene(h);
+/// Two grains in a cell of 1 m that fly apart along z, and both along `together`; zz follows `stress` [Pa].
+Scene gas(const Vec3& together, double speed, double stress) {
+  Scene scene(1e-4);
   scene.setup.domain = periodic_domain(Vec3::Constant(1));
   scene.setup.decomposition.coupling = Coupling::nscdd;
-  scene.sphere({0.2, 0.2, 0.2}, radius, mass, {0, 0, 1});
-  scene.sphere({0.7, 0.7, 0.7}, radius, mass, {0, 0, -1});
-  scene.stage().stress.to[2] = 2 * mass;  // sum of m v_z^2 / V
-  Experiment run(std::move(scene));
+  scene.sphere({0.2, 0.2, 0.2}, radius, mass, together + Vec3(0, 0, speed));
+  scene.sphere({0.7, 0.7, 0.7}, radius, mass, together - Vec3(0, 0, speed));
+  scene.stage().stress.to[2] = stress;
+  return scene;
+}
+constexpr double own_stress = 2 * mass;  ///< sum of m v_z^2 / V at 1 m/s [Pa]
+
+/// A gas pushes back: with the stress that it has, the cell stays as it is.
+TEST(GasInACellUnderItsOwnStress, HoldsTheCell) {
+  Experiment run(gas(Vec3::Zero(), 1, own_stress));
   run.steps(50);
   EXPECT_NEAR(run.simulation().state().domain.cell.zz, 1, 1e-12);
   EXPECT_NEAR(run.simulation().state().domain.rates.zz, 0, 1e-12);
@@ -147,15 +152,8 @@ TEST(GasInACellUnderItsOwnStress, HoldsTheCell) {
 
 /// What all grains do together pushes nothing, however fast it is.
 TEST(GasThatFliesAsAWhole, HoldsTheCellAsOneThatStays) {
-  const double h = 1e-4;
-  Scene scene(h);
-  scene.setup.domain = periodic_domain(Vec3::Constant(1));
-  scene.setup.decomposition.coupling = Coupling::nscdd;
-  const Vec3 together(5, -3, 7);
-  scene.sphere({0.2, 0.2, 0.2}, radius, mass, together + Vec3(0, 0, 1));
-  scene.sphere({0.7, 0.7, 0.7}, radius, mass, together - Vec3(0, 0, 1));
+  Scene scene = gas({5, -3, 7}, 1, own_stress);
   scene.stage().stress.to[0] = 0;
-  scene.stage().stress.to[2] = 2 * mass;  // sum of m v_z^2 / V
   Experiment run(std::move(scene));
   run.steps(50);
   EXPECT_NEAR(run.simulation().state().domain.cell.xx, 1, 1e-12);
@@ -165,13 +163,7 @@ TEST(GasThatFliesAsAWhole, HoldsTheCellAsOneThatStays) {
 /// Velocities whose squares are less than any number are no harm.
 TEST(GasThatHardlyMoves, LeavesTheCellAsItIs) {
   for (const double speed : {1e-150, 1e-158, 1e-200, 1e-320}) {
-    Scene scene(1e-4);
-    scene.setup.domain = periodic_domain(Vec3::Constant(1));
-    scene.setup.decomposition.coupling = Coupling::nscdd;
-    scene.sphere({0.2, 0.2, 0.2}, radius, mass, {0, 0, speed});
-    scene.sphere({0.7, 0.7, 0.7}, radius, mass, {0, 0, -speed});
-    scene.stage().stress.to[2] = 0;
-    Experiment run(std::move(scene));
+    Experiment run(gas(Vec3::Zero(), speed, 0));
     run.steps(3);
     EXPECT_EQ(run.simulation().state().domain.cell.zz, 1) << speed;
     EXPECT_LT(std::abs(run.simulation().cell()->kinetic_stress[2]), 1e-290) << speed;

@@ -42,6 +42,17 @@ TEST_F(Ending, WithMissedTolerancesIsThreeAndMarkedUnlessAllowed) {
   EXPECT_EQ(summary(at("results")).at("exit_code"), 0);
 }
 
+/// What the tolerance leaves in motion at rest is no energy from nowhere, though the step before had less.
+TEST_F(Ending, OfAPackingAtRestUnderAStressIsNoRunaway) {
+  write(at("scene.toml"),
+        "seed = 2\ntime_step = 1e-4\nallow_unconverged = true\n[material]\ndensity = 2600\n[cell]\n"
+        "lengths = [0.0105, 0.0105, 0.0105]\n[sample]\nkind = \"random\"\ncount = 30\nradius = 0.001\n"
+        "[[stage]]\nstress = { xx = 1e3, yy = 1e3, zz = 1e3 }\nend = { steps = 300 }\n"
+        "[solver]\nmax_iterations = 20000\n[output]\npictures = false\n");
+  const Outcome outcome = run("run scene.toml --out results --threads 1");
+  EXPECT_EQ(outcome.code, 0) << outcome.messages;
+}
+
 TEST_F(Ending, OfARunawayIsOneWithStepAndBody) {
   // So fast that its energy is no number.
   write(at("pair.csv"), "id,x,y,z,radius,vx,vy,vz\n0,0,0,0,0.01,0,0,0\n7,1,0,0,0.01,1e200,0,0\n");

@@ -59,10 +59,9 @@ Section<SolverSettings> solver_keys() {
               .or_auto(0, "`balance_tolerance`; in stages with friction ten times that"),
           key<SolverSettings>("direct_bodies", "", {.low = 0, .high = 5000},
                               "Clusters of contacts with more bodies are judged by estimates alone. Of what "
-                              "this allows, those "
-                              "of up to 200 bodies (500 without friction, long chains 5000) are solved "
-                              "directly before a step "
-                              "ends, which takes up to a thousand times as long as their sweeps. 0: none is.",
+                              "this allows, those of up to 200 bodies (500 without friction, long chains "
+                              "5000) are solved directly before a step ends, which takes up to a thousand "
+                              "times as long as their sweeps. 0: none is.",
                               &SolverSettings::direct_bodies),
           key<SolverSettings>(
               "overlap_tolerance", "", positive,
