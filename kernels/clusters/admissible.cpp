@@ -64,10 +64,17 @@ Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
   return left;
 }
 
+/// No contact approaches where nothing moves.
+bool rest_is_admissible(const BodyProblem& problem) {
+  return std::ranges::all_of(problem.contacts,
+                             [](const ContactEquation& c) { return c.normal.dot(c.offset) >= 0; });
+}
+
 }  // namespace
 
 bool none_admissible(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
                      double& work) {
+  if (rest_is_admissible(problem)) return false;
   const BodyProblem smooth = frictionless(problem);
   const Incoming in = coming_in(smooth);
   const double scale = std::sqrt(in.speed2), off = thresholds.inner * std::sqrt(in.mass) * scale;

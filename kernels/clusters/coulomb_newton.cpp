@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "kernels/clusters/block_elimination.hpp"
@@ -46,6 +47,7 @@ class CoulombStep {
   Vec3 velocity(std::size_t k, const Vector& d) const {
     return velocity_[k] + constrained(problem_.contacts[k], change(k, d));
   }
+  double kinetic_norm(const Vector& d) const { return std::sqrt(mass_.cwiseProduct(d).dot(d)); }
   /// r(d), and where asked for P' rho.
   Vec3 impulse(std::size_t k, const Vector& d, double firmness, const std::vector<Vec3>& t,
                Mat3* slope = nullptr) const {
@@ -81,21 +83,32 @@ class CoulombStep {
   /// Newton's step from d, where the residual is f; its work is taken off. False where there is none.
   bool way(const Vector& d, const Vector& f, double firmness, const std::vector<Vec3>& t, Vector& way,
            double& work) const {
-    std::vector<Mat3> slope(columns_.size());
-    std::vector<BlockElimination::Pair> pairs;
-    for (std::size_t k = 0; k < columns_.size(); ++k) {
-      impulse(k, d, firmness, t, &slope[k]);
-      const ContactEquation& c = problem_.contacts[k];
-      if (c.second >= 0 && !slope[k].isZero(0)) pairs.push_back({c.first, c.second});
-    }
-    BlockElimination system(freedoms_, mass_, pairs);
-    for (std::size_t k = 0; k < columns_.size(); ++k)
-      if (!slope[k].isZero(0)) add_blocks(k, slope[k], system);
-    system.factorise();
-    work -= system.work();
+    const std::vector<Mat3> slope = slopes(d, firmness, t);
+    const BlockElimination system = eliminated(slope, work);
     way = system.solve(-f);
     way -= system.solve(f + product(slope, way));
     return way.allFinite();
+  }
+  /// Of the motions that the forces of contacts which carry can make: what a step leaves undone of the one
+  /// that these hold least, as a part of it, by inverse iteration from forces without a pattern.
+  double left_undone(const Vector& d, double firmness, const std::vector<Vec3>& t, int iterations,
+                     double& work) const {
+    const std::vector<Mat3> slope = slopes(d, firmness, t);
+    const BlockElimination system = eliminated(slope, work);
+    Vector f = none();
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const auto number = static_cast<double>(k + 1);
+      const Vec3 force = slope[k] * Vec3(std::cos(number), std::cos(2.3 * number), std::cos(3.7 * number));
+      for (const Columns::OfBody& body : columns_[k].of_body)
+        f.segment(body.begin, body.count) += body.H.topRows(body.count) * force;
+    }
+    double part = 0;
+    for (int k = 0; k < iterations && !f.isZero(0); ++k) {
+      const Vector now = system.solve(f / kinetic_norm(f.cwiseQuotient(mass_)));
+      part = kinetic_norm(now);
+      f = mass_.cwiseProduct(now);
+    }
+    return part;
   }
 
  private:
@@ -118,6 +131,26 @@ class CoulombStep {
     normal_.push_back(1 / W_nn);
     tangential_.push_back(c.mu > 0 ? 2 / (W.trace() - W_nn) : 1 / W_nn);
     columns_.push_back(columns);
+  }
+  /// P' rho of all contacts.
+  std::vector<Mat3> slopes(const Vector& d, double firmness, const std::vector<Vec3>& t) const {
+    std::vector<Mat3> slope(columns_.size());
+    for (std::size_t k = 0; k < columns_.size(); ++k) impulse(k, d, firmness, t, &slope[k]);
+    return slope;
+  }
+  /// M + H S H^T, factorised.
+  BlockElimination eliminated(const std::vector<Mat3>& slope, double& work) const {
+    std::vector<BlockElimination::Pair> pairs;
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const ContactEquation& c = problem_.contacts[k];
+      if (c.second >= 0 && !slope[k].isZero(0)) pairs.push_back({c.first, c.second});
+    }
+    BlockElimination system(freedoms_, mass_, pairs);
+    for (std::size_t k = 0; k < columns_.size(); ++k)
+      if (!slope[k].isZero(0)) add_blocks(k, slope[k], system);
+    system.factorise();
+    work -= system.work();
+    return system;
   }
   /// H S H^T of a contact.
   void add_blocks(std::size_t k, const Mat3& slope, BlockElimination& system) const {
@@ -166,6 +199,7 @@ class CoulombSteps {
 
   bool solve(const StepStart& start, double& work) {
     const Vector before = d_;
+    began_ = t_;
     firmness_ = start.firmness;
     const double enough = thresholds_.search.inner * std::max(start.goal, open_);
     const double most = std::max(start.goal, thresholds_.loose * open_);
@@ -194,6 +228,17 @@ class CoulombSteps {
     return now;
   }
 
+  std::optional<double> to_come(const Correction& now, double enough, double& work) const {
+    const CoulombThresholds::Known& known = thresholds_.known;
+    const double most = known.to_come * enough;
+    if (now.open > known.left * enough || now.left > known.left * enough || known.steps * now.moved > most)
+      return {};
+    const double part = step_.left_undone(d_, firmness_, began_, known.iterations, work);
+    if (!(part < 1)) return {};
+    const double rest = now.moved * std::max(known.steps, part / (1 - part));
+    if (rest > most) return {};
+    return rest;
+  }
   bool firmer(bool small) const { return slow_ || small; }
 
  private:
@@ -219,12 +264,13 @@ class CoulombSteps {
   const BodyProblem& problem_;
   const CoulombThresholds& thresholds_;
   CoulombStep step_;
-  std::vector<Vec3> t_;  ///< per contact [N s]
-  Vector d_;             ///< per freedom [m/s]
-  double firmness_ = 0;  ///< of the last step
-  double off_ = 0;       ///< what momentum is off by behind it [N s]
-  double open_ = 0;      ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
-  bool slow_ = false;    ///< that is hardly less than before it
+  std::vector<Vec3> t_;      ///< per contact [N s]
+  std::vector<Vec3> began_;  ///< likewise, of the last step
+  Vector d_;                 ///< per freedom [m/s]
+  double firmness_ = 0;      ///< of the last step
+  double off_ = 0;           ///< what momentum is off by behind it [N s]
+  double open_ = 0;          ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
+  bool slow_ = false;        ///< that is hardly less than before it
 };
 
 }  // namespace

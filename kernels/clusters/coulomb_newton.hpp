@@ -22,6 +22,18 @@ struct CoulombThresholds {
   /// by which it has to make the residual smaller, in (0, 1).
   int most_iterations = 25, halvings = 5;
   double descent = 0.1;
+  /// When velocities are known though impulses still creep, as redundant contacts let them do by the hundred
+  /// steps: the law finds no more wrong, nor is momentum off by more, than this part `left`, in (0, 1), of
+  /// what need not be known; and what is still to come is within the part `to_come` of it, in (0, 1). That is
+  /// so many `steps` like the last, > 1, or what the last leaves undone of the motion that contacts hold
+  /// least, if that is more, by so many `iterations`, >= 1. (In a heap of 190 grains at rest 300 further
+  /// steps changed at most 1.4 times as much.)
+  struct Known {
+    double left = 0.05, to_come = 0.5;
+    double steps = 20;
+    int iterations = 12;
+  };
+  Known known = {};
 };
 
 /// What would set all contacts right, as proximal_correction, with the same goal and work.

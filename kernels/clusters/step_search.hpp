@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -53,6 +54,12 @@ struct StepStart {
 ///   bool at_rest() const                   what changes the impulses yet is rounding
 ///   double leap(double& work)              goes on as the last step has changed the impulses, so many times
 ///   std::vector<Vec3> changes() const      the impulses then, since those of the problem
+///
+/// and for problems with friction
+///
+///   std::optional<double> to_come(const Correction&, double enough, double& work) const
+///                                          what steps behind this one may still change, where that is little
+///                                          enough to be an answer [N s]
 template <class Steps>
 Correction search_by_steps(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds,
                            const SearchThresholds& search, Steps& steps, double& work) {
@@ -85,6 +92,12 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
     bool known = friction || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
+    if constexpr (requires { steps.to_come(now, enough, work); })
+      if (!now.settled)
+        if (const std::optional<double> rest = steps.to_come(now, enough, work)) {
+          now.missed = *rest;
+          now.settled = true;
+        }
     impulse = now.impulse;
     moved = now.moved;
     last = firmness;
