@@ -264,9 +264,10 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   Correction best = unchanged(problem, std::numeric_limits<double>::infinity());
   best.settled = false;
   double least = std::numeric_limits<double>::infinity();
+  const int most = friction ? thresholds.most_sliding_rounds : thresholds.most_rounds;
   int rounds = 0;
   double at_first = 0;
-  for (int since = 0; rounds < thresholds.most_rounds && since < thresholds.patience; ++since) {
+  for (int since = 0; rounds < most && since < thresholds.patience; ++since) {
     ++rounds;
     Correction now;
     const std::vector<Twist> before =

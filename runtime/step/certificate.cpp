@@ -162,6 +162,10 @@ bool Certificate::balanced(WholeProblem& whole) {
     result_.unbalance = std::numeric_limits<double>::infinity();
     return false;
   }
+  if (whole.small_clusters() && !last && large_ask_for_more(whole)) {
+    result_.unbalance = std::numeric_limits<double>::infinity();
+    return false;
+  }
   if (whole.small_clusters()) result_.unbalance = small_unbalance(whole);
   const bool small_ones = result_.unbalance <= small_tolerance();
   if (!small_ones && !last) return false;
@@ -189,6 +193,21 @@ double Certificate::small_unbalance(WholeProblem& whole) {
   });
 }
 
+/// Sweeps go on for large clusters, by what is known without a check of them. Answers about small ones, which
+/// may take as long as a hundred sweeps, can wait until the step might end.
+bool Certificate::large_ask_for_more(WholeProblem& whole) {
+  if (!whole.large_clusters() || checks_velocities(whole)) return false;
+  if (!(drifting(whole) <= settings_.balance_tolerance)) return true;
+  const WorkEstimate estimate = estimate_by_work(whole);
+  return estimate.known && !(estimate.error <= velocity_tolerance());
+}
+
+/// Of the forces of large clusters, what the drift of the wall forces leaves to come.
+double Certificate::drifting(WholeProblem& whole) {
+  if (!(result_.drift <= settings_.balance_tolerance) || result_.drift == 0) return result_.drift;
+  return unbalance(result_.drift, result_.iterations, whole.sweeps_needed());
+}
+
 double Certificate::large_unbalance(WholeProblem& whole) {
   if (checks_velocities(whole)) {
     const double error = repeated(large_check_, std::min(settings_.balance_tolerance, velocity_tolerance()),
@@ -197,11 +216,9 @@ double Certificate::large_unbalance(WholeProblem& whole) {
         larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work(whole));
     return error;
   }
-  if (!(result_.drift <= settings_.balance_tolerance)) return result_.drift;
-  const double drifting =
-      result_.drift > 0 ? unbalance(result_.drift, result_.iterations, whole.sweeps_needed()) : 0;
-  if (drifting <= settings_.balance_tolerance) result_.velocity_error = by_work(whole);
-  return drifting;
+  const double to_come = drifting(whole);
+  if (to_come <= settings_.balance_tolerance) result_.velocity_error = by_work(whole);
+  return to_come;
 }
 
 /// The energy that the contacts of large clusters exchange, of grains and walls of finite mass [J]. No less
@@ -236,21 +253,27 @@ double Certificate::relative_work(WholeProblem& whole) {
 /// Slow modes of a large cluster leave small residuals at every contact and still much momentum to be
 /// exchanged. The work of those residuals shows it: for the error e of the velocities sum r . H^T e is M (V -
 /// V_free) . e. What it is worth in velocities a check of these tells, now and then, and is remembered.
-double Certificate::by_work(WholeProblem& whole) {
+Certificate::WorkEstimate Certificate::estimate_by_work(WholeProblem& whole) {
   const double tolerance = velocity_tolerance(), work = relative_work(whole);
-  VelocityErrorMemory& memory = whole.velocity_errors();
-  if (memory.reuse().most * work <= tolerance) return memory.reuse().most * work;
+  const VelocityErrorMemory& memory = whole.velocity_errors();
+  if (memory.reuse().most * work <= tolerance) return {memory.reuse().most * work, true};
   const int done = result_.iterations;
-  if (asked_at_ == done) return asked_error_;
-  const VelocityErrorMemory::Problem problem{result_.contacts, exchanged_by_large()};
-  const double expected = memory.per_work(problem, scales_.friction) * work;
+  if (asked_at_ == done) return {asked_error_, true};
+  const double expected = memory.per_work({result_.contacts, exchanged_by_large()}, scales_.friction) * work;
   // At the end of a step that is missed anyhow nothing more is asked.
   const bool stuck = (done >= settings_.max_iterations && result_.error_rms <= settings_.tolerance) ||
                      done >= std::max<double>(thresholds_.doubtful, thresholds_.doubt_again * asked_at_);
-  if (!memory.due() && (expected <= tolerance || !stuck)) return expected;
-  asked_at_ = done;
-  asked_error_ = whole.large_error(thresholds_.velocity_resolution * tolerance);
-  memory.found(problem, asked_error_, work);
+  return {expected, !memory.due() && (expected <= tolerance || !stuck)};
+}
+
+double Certificate::by_work(WholeProblem& whole) {
+  const WorkEstimate estimate = estimate_by_work(whole);
+  if (estimate.known) return estimate.error;
+  const double work = relative_work(whole);
+  VelocityErrorMemory& memory = whole.velocity_errors();
+  asked_at_ = result_.iterations;
+  asked_error_ = whole.large_error(thresholds_.velocity_resolution * velocity_tolerance());
+  memory.found({result_.contacts, exchanged_by_large()}, asked_error_, work);
   asked_error_ = larger(asked_error_, memory.credible(scales_.friction) * work);
   return asked_error_;
 }

@@ -254,6 +254,14 @@ class Certificate {
   bool even(WholeProblem& whole);
   double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
+  bool large_ask_for_more(WholeProblem& whole);
+  double drifting(WholeProblem& whole);
+  /// Relative error of velocities by the work of the contacts' errors.
+  struct WorkEstimate {
+    double error;
+    bool known;  ///< it does; else a check of the velocities has to say
+  };
+  WorkEstimate estimate_by_work(WholeProblem& whole);
   double by_work(WholeProblem& whole);
 
   WholeCheck small_check_, large_check_, quantile_check_;
