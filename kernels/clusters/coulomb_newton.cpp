@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -47,7 +48,6 @@ class CoulombStep {
   Vec3 velocity(std::size_t k, const Vector& d) const {
     return velocity_[k] + constrained(problem_.contacts[k], change(k, d));
   }
-  double kinetic_norm(const Vector& d) const { return std::sqrt(mass_.cwiseProduct(d).dot(d)); }
   /// r(d), and where asked for P' rho.
   Vec3 impulse(std::size_t k, const Vector& d, double firmness, const std::vector<Vec3>& t,
                Mat3* slope = nullptr) const {
@@ -89,26 +89,20 @@ class CoulombStep {
     way -= system.solve(f + product(slope, way));
     return way.allFinite();
   }
-  /// Of the motions that the forces of contacts which carry can make: what a step leaves undone of the one
-  /// that these hold least, as a part of it, by inverse iteration from forces without a pattern.
-  double left_undone(const Vector& d, double firmness, const std::vector<Vec3>& t, int iterations,
-                     double& work) const {
-    const std::vector<Mat3> slope = slopes(d, firmness, t);
+  /// What steps behind the one to d, which has `moved` the bodies, add to the motion in all if contacts stay
+  /// as they are: K^-1 M moved with K = H P' rho H^T, where each adds (M + K)^-1 M times what the one before
+  /// did. K need not have an inverse: M + K firm_enough/firmness stands for it. Momentum [N s], infinite
+  /// where there is no solution.
+  double linear_rest(const Vector& d, const Vector& moved, double firmness, double firm_enough,
+                     const std::vector<Vec3>& t, double& work) const {
+    const double times = firm_enough / firmness;
+    std::vector<Mat3> slope = slopes(d, firmness, t);
+    for (Mat3& s : slope) s *= times;
     const BlockElimination system = eliminated(slope, work);
-    Vector f = none();
-    for (std::size_t k = 0; k < columns_.size(); ++k) {
-      const auto number = static_cast<double>(k + 1);
-      const Vec3 force = slope[k] * Vec3(std::cos(number), std::cos(2.3 * number), std::cos(3.7 * number));
-      for (const Columns::OfBody& body : columns_[k].of_body)
-        f.segment(body.begin, body.count) += body.H.topRows(body.count) * force;
-    }
-    double part = 0;
-    for (int k = 0; k < iterations && !f.isZero(0); ++k) {
-      const Vector now = system.solve(f / kinetic_norm(f.cwiseQuotient(mass_)));
-      part = kinetic_norm(now);
-      f = mass_.cwiseProduct(now);
-    }
-    return part;
+    const Vector f = times * mass_.cwiseProduct(moved);
+    Vector rest = system.solve(f);
+    rest -= system.solve(product(slope, rest) - f);
+    return rest.allFinite() ? momentum_of(problem_, twists(rest)) : std::numeric_limits<double>::infinity();
   }
 
  private:
@@ -192,13 +186,16 @@ class CoulombSteps {
  public:
   CoulombSteps(const BodyProblem& problem, const CoulombThresholds& thresholds)
       : problem_(problem), thresholds_(thresholds), step_(problem), t_(problem.impulse), d_(step_.none()) {
+    const auto joints =
+        std::ranges::count_if(problem.contacts, [](const ContactEquation& c) { return c.second >= 0; });
+    loops_ = joints - static_cast<std::ptrdiff_t>(problem.bodies.size()) + 1;
     for (std::size_t k = 0; k < t_.size(); ++k) open_ += (t_[k] - mapped(k, t_[k]).carried).norm();
   }
 
   std::vector<Twist> motion() const { return step_.twists(d_); }
 
   bool solve(const StepStart& start, double& work) {
-    const Vector before = d_;
+    before_ = d_;
     began_ = t_;
     firmness_ = start.firmness;
     const double enough = thresholds_.search.inner * std::max(start.goal, open_);
@@ -208,7 +205,7 @@ class CoulombSteps {
     for (int k = 0; k < thresholds_.most_iterations && off_ > enough && work > 0; ++k)
       if (!step_.way(d_, f, firmness_, t_, way, work) || !go_along(way, f)) break;
     if (off_ <= most) return true;
-    d_ = before;
+    d_ = before_;
     return false;
   }
 
@@ -230,13 +227,13 @@ class CoulombSteps {
 
   std::optional<double> to_come(const Correction& now, double enough, double& work) const {
     const CoulombThresholds::Known& known = thresholds_.known;
+    if (loops_ <= known.loops) return {};
     const double most = known.to_come * enough;
     if (now.open > known.left * enough || now.left > known.left * enough || known.steps * now.moved > most)
       return {};
-    const double part = step_.left_undone(d_, firmness_, began_, known.iterations, work);
-    if (!(part < 1)) return {};
-    const double rest = now.moved * std::max(known.steps, part / (1 - part));
-    if (rest > most) return {};
+    const double linear = step_.linear_rest(d_, d_ - before_, firmness_, known.firmness, began_, work);
+    const double rest = std::max(known.steps * now.moved, linear);
+    if (!(rest <= most)) return {};
     return rest;
   }
   bool firmer(bool small) const { return slow_ || small; }
@@ -264,13 +261,15 @@ class CoulombSteps {
   const BodyProblem& problem_;
   const CoulombThresholds& thresholds_;
   CoulombStep step_;
-  std::vector<Vec3> t_;      ///< per contact [N s]
-  std::vector<Vec3> began_;  ///< likewise, of the last step
-  Vector d_;                 ///< per freedom [m/s]
-  double firmness_ = 0;      ///< of the last step
-  double off_ = 0;           ///< what momentum is off by behind it [N s]
-  double open_ = 0;          ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
-  bool slow_ = false;        ///< that is hardly less than before it
+  std::vector<Vec3> t_;       ///< per contact [N s]
+  std::vector<Vec3> began_;   ///< likewise, of the last step
+  Vector d_;                  ///< per freedom [m/s]
+  Vector before_;             ///< likewise, where the last step began
+  double firmness_ = 0;       ///< of the last step
+  double off_ = 0;            ///< what momentum is off by behind it [N s]
+  double open_ = 0;           ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
+  std::ptrdiff_t loops_ = 0;  ///< that contacts between bodies close
+  bool slow_ = false;         ///< that is hardly less than before it
 };
 
 }  // namespace

@@ -256,6 +256,21 @@ TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDe
   EXPECT_GE(judged, 1);
 }
 
+TEST(CertificateAudit, OfALatticeWithFrictionWhoseForcesComeSlowlyIsNotDeceived) {
+  // In step 15 of a cold start proximal steps a thousand times softer than the firmest changed next to
+  // nothing, 15 % of the largest force away from an answer.
+  const AuditedRun run = audited(make_scene("lattice", 880, {}), 20);
+  int judged = 0;
+  for (const AuditedStep& step : run.steps) {
+    if (!step.certified || step.judged != Judged::yes) continue;
+    ++judged;
+    EXPECT_LT(step.errors.velocity, step.claimed) << step.step;
+    EXPECT_LT(step.errors.wall_force, step.claimed) << step.step;
+    EXPECT_LT(step.errors.contact_force, step.claimed) << step.step;
+  }
+  EXPECT_GE(judged, 10);
+}
+
 TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {
   const test::ScratchDirectory scratch;
   StudyCertificateOptions options;

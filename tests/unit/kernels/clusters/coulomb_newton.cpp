@@ -113,6 +113,48 @@ TEST(CoulombSteps, TwoGrainsJammedInAVObeyTheLaw) {
   expect_the_law(problem, impulse, 1e-8, 1e-9);
 }
 
+/// Grains of 1 kg on a cubic lattice, `edge` along and across and `layers` high, that touch all neighbours
+/// and a floor, at rest but for the fall of a step. Each column carries its own weight, or a part of it so
+/// far.
+BodyProblem block(int edge, int layers, double carried) {
+  BodyProblem problem;
+  const auto number = [&](int i, int j, int k) { return (k * edge + j) * edge + i; };
+  for (int k = 0; k < layers; ++k)
+    for (int j = 0; j < edge; ++j)
+      for (int i = 0; i < edge; ++i) add_grain(problem, Vec3(i, j, k), 0.3);
+  for (int k = 0; k < layers; ++k)
+    for (int j = 0; j < edge; ++j)
+      for (int i = 0; i < edge; ++i) {
+        add_contact(problem, number(i, j, k), k > 0 ? number(i, j, k - 1) : -1, Vec3::UnitZ(), 0.3,
+                    k > 0 ? -1 : 0);
+        problem.impulse.back() = carried * fall * (layers - k) * Vec3::UnitZ();
+        if (i > 0) add_contact(problem, number(i, j, k), number(i - 1, j, k), Vec3::UnitX(), 0.3);
+        if (j > 0) add_contact(problem, number(i, j, k), number(i, j - 1, k), Vec3::UnitY(), 0.3);
+      }
+  return problem;
+}
+
+/// All of it has to stop. Steps that end while redundant forces may still creep are soft, and move little.
+TEST(CoulombSteps, SayWhatIsStillToCome) {
+  constexpr int edge = 5, layers = 8;
+  int early = 0;
+  for (const double carried : {0.0, 0.5, 0.9, 0.999})
+    for (const double precise : {1e-3, 1e-2, 0.1, 0.3, 1.0, 10.0}) {
+      const BodyProblem problem = block(edge, layers, carried);
+      const double missing = (1 - carried) * edge * edge * layers * fall;
+      double work = 1e9;
+      const Correction answer = coulomb_correction(problem, precise * missing, {}, {}, work);
+      ASSERT_TRUE(answer.settled) << carried << ' ' << precise;
+      if (answer.missed > 0.01 * precise * missing) ++early;
+      double wrong = 0;
+      for (const Twist& motion : answer.motion)
+        wrong += (motion.u - (1 - carried) * fall * Vec3::UnitZ()).norm() + 0.4 * motion.w.norm();
+      EXPECT_LE(wrong, answer.uncertain() + 0.01 * precise * missing) << carried << ' ' << precise;
+      EXPECT_LE(answer.uncertain(), precise * missing) << carried << ' ' << precise;
+    }
+  EXPECT_GE(early, 3);
+}
+
 TEST(CoulombSteps, KeepToTheirWorkAndSaySo) {
   const BodyProblem problem = wedge(0.3, 0.1);
   double work = 1;

@@ -124,7 +124,7 @@ TEST(StepError, OfAClusterWithoutAnAnswerIsNotWhatItHappenedToFind) {
   const double normal = fall / (2 * std::sin(0.0412));
   for (std::size_t k = 0; k < 2; ++k) problem.impulse[k] = 0.5 * normal * problem.contacts[k].normal;
   StepErrorThresholds thresholds;
-  thresholds.cluster.correction.most_rounds = 1;
+  thresholds.cluster.correction.most_sliding_rounds = 1;
   thresholds.cluster.least_budget = thresholds.cluster.budget_per_sweep = 0;
   const StepError error = step_error(problem, {.enough = 1e-3}, thresholds);
   EXPECT_FALSE(error.solved);
