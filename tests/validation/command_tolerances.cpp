@@ -90,6 +90,48 @@ TEST_F(Tolerances, OfTheWorstContactAndOfMostOfThemAreKept) {
   EXPECT_EQ(largest("worst", "error_quantile"), 0) << "nobody asked for it";
 }
 
+// Friction leaves the forces in a bed of grains at rest free to creep, and nobody's velocity: ten sweeps of
+// the impulses of the step before are enough for each step, and the answer that says so is found.
+TEST_F(Tolerances, AreMetByABedAtRestWhoseForcesCreep) {
+  write(at("bed.toml"), R"(gravity = [0, 0, -9.81]
+time_step = 5e-4
+[material]
+density = 2600
+friction = 0.4
+wall_friction = 0.4
+[sample]
+kind = "deposition"
+count = 190
+base = [0.12, 0.12]
+radius_distribution = "uniform"
+radius_min = 0.010
+radius_max = 0.015
+[[wall]]
+name = "x-"
+[[wall]]
+name = "x+"
+[[wall]]
+name = "y-"
+[[wall]]
+name = "y+"
+[[wall]]
+name = "floor"
+side = "z-"
+[[stage]]
+name = "settle"
+end = { steps = 40 }
+[output]
+pictures = false
+)");
+  const Outcome outcome = run("run bed.toml --out bed");
+  EXPECT_EQ(outcome.code, 0) << outcome.messages;
+  const Table steps = read_table(at("bed/steps.csv"));
+  ASSERT_EQ(steps.rows.size(), 40U);
+  double sweeps = 0;
+  for (std::size_t k = 0; k < steps.rows.size(); ++k) sweeps += steps.number(k, "iterations");
+  EXPECT_LE(sweeps, 40 * 20);
+}
+
 TEST_F(Tolerances, ThatMakeNoSenseAreRefused) {
   write(at("scene.toml"), pressed_box);
   for (const char* wrong :
