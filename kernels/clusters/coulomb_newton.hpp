@@ -31,7 +31,7 @@ struct CoulombThresholds {
   /// much.)
   struct Known {
     int loops = 100;
-    double left = 0.02, to_come = 2;
+    double left = 0.02, to_come = 0.5;
     double steps = 20, firmness = 1e7;
   };
   Known known = {};

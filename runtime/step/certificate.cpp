@@ -18,6 +18,7 @@ void Certificate::begin(Scales scales) {
   corrected_from_ = std::numeric_limits<double>::infinity();
   corrected_at_ = -1;
   exchanged_by_small_ = {};
+  small_known_ = false;
   mends_ = false;
   asked_at_ = 0;
   asked_error_ = 0;
@@ -182,6 +183,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
   return repeated(small_check_, small_tolerance(), [&](double enough) {
     const SmallError error = whole.small_error(enough, result_.iterations);
     exchanged_by_small_ = error.exchanged;
+    small_known_ = true;
     mends_ = error.mends;
     // Sweeps go on where others can still be put right.
     result_.jammed = error.jammed && !error.mends;
@@ -194,10 +196,12 @@ double Certificate::small_unbalance(WholeProblem& whole) {
 }
 
 /// Sweeps go on for large clusters, by what is known without a check of them. Answers about small ones, which
-/// may take as long as a hundred sweeps, can wait until the step might end.
+/// may take as long as a hundred sweeps, can wait until the step might end; but for the first in a step,
+/// which tells what of all that is exchanged is theirs.
 bool Certificate::large_ask_for_more(WholeProblem& whole) {
   if (!whole.large_clusters() || checks_velocities(whole)) return false;
   if (!(drifting(whole) <= settings_.balance_tolerance)) return true;
+  if (!small_known_) return false;
   const WorkEstimate estimate = estimate_by_work(whole);
   return estimate.known && !(estimate.error <= velocity_tolerance());
 }

@@ -242,6 +242,7 @@ class Certificate {
   /// clusters, as of the last answer about them; velocities that rounding makes pass [m/s].
   double work_ = 0;
   Exchanged exchanged_, exchanged_by_small_;
+  bool small_known_ = false;  ///< there was such an answer in this step
   double rounding_ = 0;
   /// Of the first check of the step, or the first since ADMM, or since sweeps became plain [m^2/s^2].
   double first_residual2_ = 0;

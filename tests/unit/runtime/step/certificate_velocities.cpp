@@ -57,6 +57,25 @@ TEST(Certificate, ComparesTheWorkOfErrorsWithAllThatLargeClustersExchange) {
         << "neither what small clusters exchange nor their share of walls is of it";
 }
 
+// Answers about small clusters are dear, and do not end a step that goes on for large ones.
+TEST(Certificate, AsksForSmallClustersOnceAndThenWhereThatMayEndTheStep) {
+  const SolverSettings settings{.balance_tolerance = 0.05};
+  Certificate certificate(settings);
+  certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
+  KnownProblem problem(1, {0.5}, {0});
+  const auto asked_behind = [&](const Found& found) {
+    const Verdict verdict =
+        certificate.judge(sums_of(found, 1000), {.iterations = found.iterations}, problem);
+    EXPECT_EQ(verdict, found.iterations < 50 ? Verdict::go_on : Verdict::solved) << found.iterations;
+    return problem.small_asked();
+  };
+  EXPECT_EQ(asked_behind({0, 1}), 0u);
+  EXPECT_EQ(asked_behind({10, 1e-4, 1, 0.02}), 1u) << "how much of what is exchanged is theirs?";
+  EXPECT_EQ(asked_behind({20, 1e-4, 1, 0.02}), 1u) << "the work of errors asks for more";
+  EXPECT_EQ(asked_behind({40, 1e-4, 2, 1e-6}), 1u) << "the force at the wall does";
+  EXPECT_EQ(asked_behind({80, 1e-4, 2, 1e-6}), 2u);
+}
+
 // A work that is nothing to all may be much to one.
 TEST(Certificate, BelievesTheWorstOfSeveralLargeClusters) {
   SolverSettings settings{.balance_tolerance = 0.05};

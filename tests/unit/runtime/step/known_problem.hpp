@@ -47,6 +47,7 @@ class KnownProblem : public WholeProblem {
   double quantile_error(double) override { return 0; }
   WorstErrors worst_errors() override { return {}; }
   std::size_t asked() const { return asked_; }
+  std::size_t small_asked() const { return small_asked_; }
   bool jammed = false, mends = false;  ///< what small clusters are besides
   Exchanged exchanged;                 ///< by them
   std::optional<double> largest_work;  ///< of several large clusters, where there are any
