@@ -27,6 +27,16 @@ struct Columns {
   std::array<OfBody, 2> of_body;
 };
 
+/// Loops that pairs of bodies close which have contacts, in a cluster.
+std::ptrdiff_t loops_of(const BodyProblem& problem) {
+  std::vector<std::array<std::int32_t, 2>> pairs;
+  for (const ContactEquation& c : problem.contacts)
+    if (c.second >= 0) pairs.push_back({std::min(c.first, c.second), std::max(c.first, c.second)});
+  std::ranges::sort(pairs);
+  const auto pairs_end = std::ranges::unique(pairs).begin();
+  return pairs_end - pairs.begin() - static_cast<std::ptrdiff_t>(problem.bodies.size()) + 1;
+}
+
 /// The problem of a step, around impulses t.
 class CoulombStep {
  public:
@@ -89,17 +99,23 @@ class CoulombStep {
     way -= system.solve(f + product(slope, way));
     return way.allFinite();
   }
-  /// What steps behind the one to d, which has `moved` the bodies, add to the motion in all if contacts stay
-  /// as they are: K^-1 M moved with K = H P' rho H^T, where each adds (M + K)^-1 M times what the one before
-  /// did. K need not have an inverse: M + K firm_enough/firmness stands for it. Momentum [N s], infinite
-  /// where there is no solution.
-  double linear_rest(const Vector& d, const Vector& moved, double firmness, double firm_enough,
-                     const std::vector<Vec3>& t, double& work) const {
+  /// What steps behind the one from impulses t to d add to the motion in all, if contacts stay as they are:
+  /// the R with H^T R = -(v + H^T d) at those that carry. That step has changed their impulses by what this
+  /// asks for over rho, and has left a `residual`: (M + K) R = H (r(d) - t) - residual, of which K = H P' rho
+  /// H^T need not have an inverse, and is made so firm that M hardly counts. Momentum [N s], infinite where
+  /// there is no solution.
+  double linear_rest(const Vector& d, double firmness, double firm_enough, const std::vector<Vec3>& t,
+                     double& work) const {
     const double times = firm_enough / firmness;
     std::vector<Mat3> slope = slopes(d, firmness, t);
     for (Mat3& s : slope) s *= times;
     const BlockElimination system = eliminated(slope, work);
-    const Vector f = times * mass_.cwiseProduct(moved);
+    Vector f = -residual(d, firmness, t);
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const Vec3 change = times * (impulse(k, d, firmness, t) - t[k]);
+      for (const Columns::OfBody& body : columns_[k].of_body)
+        f.segment(body.begin, body.count) += body.H.topRows(body.count) * change;
+    }
     Vector rest = system.solve(f);
     rest -= system.solve(product(slope, rest) - f);
     return rest.allFinite() ? momentum_of(problem_, twists(rest)) : std::numeric_limits<double>::infinity();
@@ -186,16 +202,14 @@ class CoulombSteps {
  public:
   CoulombSteps(const BodyProblem& problem, const CoulombThresholds& thresholds)
       : problem_(problem), thresholds_(thresholds), step_(problem), t_(problem.impulse), d_(step_.none()) {
-    const auto joints =
-        std::ranges::count_if(problem.contacts, [](const ContactEquation& c) { return c.second >= 0; });
-    loops_ = joints - static_cast<std::ptrdiff_t>(problem.bodies.size()) + 1;
+    loops_ = loops_of(problem);
     for (std::size_t k = 0; k < t_.size(); ++k) open_ += (t_[k] - mapped(k, t_[k]).carried).norm();
   }
 
   std::vector<Twist> motion() const { return step_.twists(d_); }
 
   bool solve(const StepStart& start, double& work) {
-    before_ = d_;
+    const Vector before = d_;
     began_ = t_;
     firmness_ = start.firmness;
     const double enough = thresholds_.search.inner * std::max(start.goal, open_);
@@ -205,7 +219,7 @@ class CoulombSteps {
     for (int k = 0; k < thresholds_.most_iterations && off_ > enough && work > 0; ++k)
       if (!step_.way(d_, f, firmness_, t_, way, work) || !go_along(way, f)) break;
     if (off_ <= most) return true;
-    d_ = before_;
+    d_ = before;
     return false;
   }
 
@@ -231,7 +245,7 @@ class CoulombSteps {
     const double most = known.to_come * enough;
     if (now.open > known.left * enough || now.left > known.left * enough || known.steps * now.moved > most)
       return {};
-    const double linear = step_.linear_rest(d_, d_ - before_, firmness_, known.firmness, began_, work);
+    const double linear = step_.linear_rest(d_, firmness_, known.firmness, began_, work);
     const double rest = std::max(known.steps * now.moved, linear);
     if (!(rest <= most)) return {};
     return rest;
@@ -264,11 +278,10 @@ class CoulombSteps {
   std::vector<Vec3> t_;       ///< per contact [N s]
   std::vector<Vec3> began_;   ///< likewise, of the last step
   Vector d_;                  ///< per freedom [m/s]
-  Vector before_;             ///< likewise, where the last step began
   double firmness_ = 0;       ///< of the last step
   double off_ = 0;            ///< what momentum is off by behind it [N s]
   double open_ = 0;           ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
-  std::ptrdiff_t loops_ = 0;  ///< that contacts between bodies close
+  std::ptrdiff_t loops_ = 0;  ///< loops_of
   bool slow_ = false;         ///< that is hardly less than before it
 };
 

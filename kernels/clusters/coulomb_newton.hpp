@@ -23,7 +23,7 @@ struct CoulombThresholds {
   int most_iterations = 25, halvings = 5;
   double descent = 0.1;
   /// When velocities are known though impulses still creep, as redundant contacts let them do by the hundred
-  /// steps: contacts close more than so many `loops`, >= 0, as chains and columns do not; the law finds no
+  /// steps: bodies that touch close more than so many `loops`, >= 0, as chains do not; the law finds no
   /// more wrong, nor is momentum off by more, than this part `left`, in (0, 1), of what need not be known;
   /// and what is still to come is within the part `to_come` of it, in (0, 1). That is so many `steps` like
   /// the last, > 1, as contacts may change; or if that is more all that would follow if they did not, as a
@@ -32,7 +32,7 @@ struct CoulombThresholds {
   struct Known {
     int loops = 100;
     double left = 0.02, to_come = 0.5;
-    double steps = 20, firmness = 1e7;
+    double steps = 20, firmness = 1e9;
   };
   Known known = {};
 };

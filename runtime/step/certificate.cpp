@@ -196,12 +196,12 @@ double Certificate::small_unbalance(WholeProblem& whole) {
 }
 
 /// Sweeps go on for large clusters, by what is known without a check of them. Answers about small ones, which
-/// may take as long as a hundred sweeps, can wait until the step might end; but for the first in a step,
-/// which tells what of all that is exchanged is theirs.
+/// may take as long as a hundred sweeps, can wait until the step might end; but for the first in a step and
+/// behind each time that they were put right: it tells what of all that is exchanged is theirs, and mends.
 bool Certificate::large_ask_for_more(WholeProblem& whole) {
   if (!whole.large_clusters() || checks_velocities(whole)) return false;
-  if (!(drifting(whole) <= settings_.balance_tolerance)) return true;
   if (!small_known_) return false;
+  if (!(drifting(whole) <= settings_.balance_tolerance)) return true;
   const WorkEstimate estimate = estimate_by_work(whole);
   return estimate.known && !(estimate.error <= velocity_tolerance());
 }
@@ -295,6 +295,7 @@ void Certificate::corrected() {
   ++result_.corrections;
   history_.start_anew();
   small_check_ = large_check_ = quantile_check_ = {};
+  small_known_ = false;
   asked_at_ = 0;
   work_at_ = -1;
 }
