@@ -83,11 +83,8 @@ class CoulombStep {
   /// M d - H (r(d) - r) [N s].
   Vector residual(const Vector& d, double firmness, const std::vector<Vec3>& t) const {
     Vector f = mass_.cwiseProduct(d);
-    for (std::size_t k = 0; k < columns_.size(); ++k) {
-      const Vec3 change = impulse(k, d, firmness, t) - problem_.impulse[k];
-      for (const Columns::OfBody& body : columns_[k].of_body)
-        f.segment(body.begin, body.count) -= body.H.topRows(body.count) * change;
-    }
+    for (std::size_t k = 0; k < columns_.size(); ++k)
+      add_force(k, problem_.impulse[k] - impulse(k, d, firmness, t), f);
     return f;
   }
   /// Newton's step from d, where the residual is f; its work is taken off. False where there is none.
@@ -111,11 +108,8 @@ class CoulombStep {
     for (Mat3& s : slope) s *= times;
     const BlockElimination system = eliminated(slope, work);
     Vector f = -residual(d, firmness, t);
-    for (std::size_t k = 0; k < columns_.size(); ++k) {
-      const Vec3 change = times * (impulse(k, d, firmness, t) - t[k]);
-      for (const Columns::OfBody& body : columns_[k].of_body)
-        f.segment(body.begin, body.count) += body.H.topRows(body.count) * change;
-    }
+    for (std::size_t k = 0; k < columns_.size(); ++k)
+      add_force(k, times * (impulse(k, d, firmness, t) - t[k]), f);
     Vector rest = system.solve(f);
     rest -= system.solve(product(slope, rest) - f);
     return rest.allFinite() ? momentum_of(problem_, twists(rest)) : std::numeric_limits<double>::infinity();
@@ -171,14 +165,15 @@ class CoulombStep {
           system.add(bodies[a], bodies[b],
                      columns_[k].of_body[a].H * slope * columns_[k].of_body[b].H.transpose());
   }
+  /// f += H r of a contact.
+  void add_force(std::size_t k, const Vec3& r, Vector& f) const {
+    for (const Columns::OfBody& body : columns_[k].of_body)
+      f.segment(body.begin, body.count) += body.H.topRows(body.count) * r;
+  }
   /// M x + sum of H S H^T x.
   Vector product(const std::vector<Mat3>& slope, const Vector& x) const {
     Vector y = mass_.cwiseProduct(x);
-    for (std::size_t k = 0; k < columns_.size(); ++k) {
-      const Vec3 force = slope[k] * change(k, x);
-      for (const Columns::OfBody& body : columns_[k].of_body)
-        y.segment(body.begin, body.count) += body.H.topRows(body.count) * force;
-    }
+    for (std::size_t k = 0; k < columns_.size(); ++k) add_force(k, slope[k] * change(k, x), y);
     return y;
   }
   /// H^T d of a contact.
@@ -201,8 +196,12 @@ class CoulombStep {
 class CoulombSteps {
  public:
   CoulombSteps(const BodyProblem& problem, const CoulombThresholds& thresholds)
-      : problem_(problem), thresholds_(thresholds), step_(problem), t_(problem.impulse), d_(step_.none()) {
-    loops_ = loops_of(problem);
+      : problem_(problem),
+        thresholds_(thresholds),
+        step_(problem),
+        t_(problem.impulse),
+        d_(step_.none()),
+        loops_(loops_of(problem)) {
     for (std::size_t k = 0; k < t_.size(); ++k) open_ += (t_[k] - mapped(k, t_[k]).carried).norm();
   }
 
@@ -275,14 +274,14 @@ class CoulombSteps {
   const BodyProblem& problem_;
   const CoulombThresholds& thresholds_;
   CoulombStep step_;
-  std::vector<Vec3> t_;       ///< per contact [N s]
-  std::vector<Vec3> began_;   ///< likewise, of the last step
-  Vector d_;                  ///< per freedom [m/s]
-  double firmness_ = 0;       ///< of the last step
-  double off_ = 0;            ///< what momentum is off by behind it [N s]
-  double open_ = 0;           ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
-  std::ptrdiff_t loops_ = 0;  ///< loops_of
-  bool slow_ = false;         ///< that is hardly less than before it
+  std::vector<Vec3> t_;      ///< per contact [N s]
+  std::vector<Vec3> began_;  ///< likewise, of the last step
+  Vector d_;                 ///< per freedom [m/s]
+  double firmness_ = 0;      ///< of the last step
+  double off_ = 0;           ///< what momentum is off by behind it [N s]
+  double open_ = 0;          ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
+  std::ptrdiff_t loops_;     ///< loops_of
+  bool slow_ = false;        ///< that is hardly less than before it
 };
 
 }  // namespace

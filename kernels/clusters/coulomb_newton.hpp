@@ -5,6 +5,7 @@
 /// from one step to the next. Jammed grains, whose sliding contacts creep there by hundreds of steps or go to
 /// and fro, are solved by it (docs/decisions/0024-certificate.md).
 
+#include "kernels/clusters/clusters.hpp"
 #include "kernels/clusters/step_search.hpp"
 
 namespace talus {
@@ -30,7 +31,7 @@ struct CoulombThresholds {
   /// firmness >> 1 shows. (In a heap of 190 grains at rest 300 further steps changed at most 1.4 times as
   /// much.)
   struct Known {
-    int loops = 100;
+    std::int32_t loops = SmallClusters{}.loops;
     double left = 0.02, to_come = 0.5;
     double steps = 20, firmness = 1e9;
   };
