@@ -2,9 +2,10 @@
 """Runs that stop and go on at random, on ranks and threads drawn anew each time, against the run that was never stopped.
 
     tests/bench/resume.py OUT [--talus build/release/talus] [--trials 100] [--stops 1,1] [--minutes 30] [--patience 300] [--seed 1]
-                          [--scene apps/scenes/demo.toml] [--subdomains 4] [--set KEY=VALUE ...]
+                          [--scene apps/scenes/demo.toml] [--subdomains 4] [--set KEY=VALUE ...] [--kill]
 
-The digest of the end, and every CSV file but for its columns of wall-clock time, must be equal. `--stops 10,10`: ten
+With --kill a run does not stop behind a step: one of its processes, a rank or mpirun, gets SIGKILL at any moment, and all
+of them have to be gone within ten seconds. The digest of the end, and every CSV file but for its columns of wall-clock time, must be equal. `--stops 10,10`: ten
 resumptions in a row. A line a trial tells what was done. A run that writes nothing for --patience seconds is called
 hung; on cores that others use two ranks that wait for one another may take hundreds of times their processor time.
 Ends after --minutes, and says how many trials there were. Exit code 1 where one differs, fails or hangs.
@@ -13,9 +14,11 @@ Ends after --minutes, and says how many trials there were. Exit code 1 where one
 import argparse
 import csv
 import json
+import os
 import pathlib
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -42,19 +45,58 @@ def written(folder):
     return sorted((path.name, path.stat().st_size) for path in folder.glob("*.[cl][so][vg]"))
 
 
+def processes(folder):
+    """Those that still run into a folder: mpirun and ranks, which it gives groups of their own."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                words = (entry / "cmdline").read_bytes().split(b"\0")
+            except OSError:
+                continue
+            if str(folder).encode() in words:
+                found.append(int(entry.name))
+    return found
+
+
 class Runner:
     def __init__(self, options):
         self.options = options
 
-    def run(self, folder, ranks, threads, more):
+    def command(self, folder, ranks, threads, more):
         command = [self.options.talus, "run", self.options.scene, "--out", folder, "--quiet", "--threads", threads]
         command += ["--set", f"decomposition.subdomains={self.options.subdomains}"]
         for setting in self.options.set:
             command += ["--set", setting]
         if ranks > 1:
             command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", ranks] + command
+        return [str(word) for word in command + more]
+
+    def kill(self, folder, ranks, threads, after, draw):
+        """Begins a run and kills one of its processes after so many seconds. None, or what was left running."""
+        command = self.command(folder, ranks, threads, ["--resume"])
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(after)
+        if alive := processes(folder):
+            try:
+                os.kill(draw.choice(sorted(alive)), signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        until = time.monotonic() + 10
+        while time.monotonic() < until:
+            process.poll()
+            if not (left := processes(folder)):
+                return None
+            time.sleep(0.05)
+        for pid in left:
+            os.kill(pid, signal.SIGKILL)
+        process.wait()
+        return f"{len(left)} processes ran on after a kill"
+
+    def run(self, folder, ranks, threads, more):
+        command = self.command(folder, ranks, threads, more)
         with tempfile.TemporaryFile("w+") as said:
-            process = subprocess.Popen([str(word) for word in command + more], stdout=said, stderr=subprocess.STDOUT)
+            process = subprocess.Popen(command, stdout=said, stderr=subprocess.STDOUT)
             seen, since = None, time.monotonic()
             while process.poll() is None:
                 time.sleep(0.05)
@@ -67,6 +109,21 @@ class Runner:
             said.seek(0)
             code = process.returncode
             return code if code in (0, 3) else f"exit {code}: {said.read().strip()}"
+
+
+def killed(runner, folder, seconds, draw):
+    """Likewise, with kills: so many as there may be stops, each within so many seconds."""
+    shutil.rmtree(folder, ignore_errors=True)
+    history = []
+    for _ in range(draw.randint(*runner.options.stops)):
+        ranks = draw.randint(1, 2)
+        after = draw.uniform(0, seconds)
+        history.append(f"killed after {after:.2f} s on {ranks} ranks")
+        if failure := runner.kill(folder, ranks, 1, after, draw):
+            return history, failure
+    history.append("end on 1x1")
+    code = runner.run(folder, 1, 1, ["--resume"])
+    return history, None if code in (0, 3) else code
 
 
 def trial(runner, folder, steps, draw):
@@ -102,6 +159,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--subdomains", type=int, default=4)
     parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--kill", action="store_true")
     options = parser.parse_args()
     until = time.monotonic() + 60 * options.minutes
     options.out.mkdir(parents=True, exist_ok=True)
@@ -113,13 +171,13 @@ def main():
     code = runner.run(straight, 1, 1, [])
     if code not in (0, 3):
         sys.exit(f"resume: the uninterrupted run ended with {code}")
-    steps, expected = summary(straight)["steps"], tables(straight)
-    print(f"{steps} steps, digest {summary(straight)['digest']}, {time.monotonic() - began:.1f} s", flush=True)
+    steps, expected, seconds = summary(straight)["steps"], tables(straight), time.monotonic() - began
+    print(f"{steps} steps, digest {summary(straight)['digest']}, {seconds:.1f} s", flush=True)
 
     done = wrong = 0
     while done < options.trials and time.monotonic() < until:
         folder = options.out / "parts"
-        history, failure = trial(runner, folder, steps, draw)
+        history, failure = killed(runner, folder, seconds, draw) if options.kill else trial(runner, folder, steps, draw)
         if failure is None:
             differ = [name for name, rows in expected.items() if tables(folder).get(name) != rows]
             if summary(folder)["digest"] != summary(straight)["digest"]:
