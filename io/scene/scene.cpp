@@ -57,7 +57,7 @@ class SceneReader {
     read_walls();
     read_stages();
     check_motions(root_, scene_);
-    check_faces();
+    check_stages_of_walls();
     read_grain_rules(root_, scene_);
     check_by_cell([&] { validate_cell(scene_.setup); });
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
@@ -257,8 +257,8 @@ class SceneReader {
     }
   }
 
-  /// Walls that come or go with stages leave no pressure without a face.
-  void check_faces() const {
+  /// Walls that come or go with stages leave no pressure without a face, and no load without a wall.
+  void check_stages_of_walls() const {
     std::vector<Wall> walls = scene_.setup.walls;
     std::size_t k = 0;
     for (const toml::table* table : tables_at(root_, "stage", "stage")) {
@@ -267,7 +267,24 @@ class SceneReader {
       for (std::size_t wall = 0; wall < walls.size(); ++wall)
         if (!walls[wall].absent && walls[wall].load.drive == WallDrive::pressure)
           require_face(walls, wall, *table, fmt::format("stage[{}]", k));
+      refuse_loads_of_gone(*table, k, walls);
       ++k;
+    }
+  }
+  void refuse_loads_of_gone(const toml::table& table, std::size_t k, const std::vector<Wall>& walls) const {
+    const std::vector<Stage>& stages = scene_.setup.stages;
+    const std::string path = fmt::format("stage[{}].load", k);
+    std::size_t at = 0;
+    for (const toml::table* entry : tables_at(table, "load", path)) {
+      const std::string& name = stages[k].loads[at].first;
+      const auto wall = std::ranges::find(walls, name, &Wall::name);
+      const auto gone = std::ranges::find(stages, wall->until_stage, &Stage::name);
+      if (wall->absent && gone - stages.begin() <= static_cast<std::ptrdiff_t>(k))
+        fail_at(*entry->get("wall"), fmt::format("{}[{}].wall", path, at),
+                fmt::format("wall '{}' is gone with the beginning of stage '{}' (until_stage). Leave this load "
+                            "out, or let the wall stay longer",
+                            name, wall->until_stage));
+      ++at;
     }
   }
 

@@ -199,5 +199,18 @@ TEST_F(WallMotions, APressureNeedsAFaceInEveryStage) {
   EXPECT_NO_THROW(parse(scene(late, late))) << "it has no face before it is there, and needs none";
 }
 
+TEST_F(WallMotions, ALoadOfAWallThatIsGoneIsRefused) {
+  const auto scene = [](const std::string& stages_of_wall, const std::string& load) {
+    return scene_of("side = \"z-\"\nposition = 1\n" + stages_of_wall) +
+           "\n[[stage]]\nname = \"third\"\ntime_step = 1e-3\nend = { steps = 1 }\n" + load;
+  };
+  const std::string wall = parse(scene("", "")).setup.walls.front().name;
+  const std::string load = "[[stage.load]]\nwall = \"" + wall + "\"\n";
+  expect_refused(scene("until_stage = \"second\"\n", load), "stage[2].load[0].wall",
+                 "is gone with the beginning of stage 'second'");
+  EXPECT_NO_THROW(parse(scene("from_stage = \"third\"\n", load)));
+  EXPECT_NO_THROW(parse(scene("", load)));
+}
+
 }  // namespace
 }  // namespace talus::io::wall_motions_test
