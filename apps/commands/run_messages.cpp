@@ -154,9 +154,9 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
   if (tally.passed > 0)
     terminal.warn(
-        "warning: {} times a grain went through what it met, or deep into it, within one step; "
+        "warning: a grain went through what it met, or deep into it, within one step, in {}; "
         "these steps count as unconverged. Reduce time_step",
-        tally.passed);
+        counted(static_cast<std::size_t>(tally.passed), "case"));
   if (tally.overlapped > 0)
     terminal.warn(
         "warning: {} ended with overlaps beyond solver.overlap_tolerance = {:.2g}: the deepest, "
@@ -174,16 +174,25 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         name_of(worst.body, simulation.setup().walls), worst.body_error);
   if (tally.stagnated > 0)
     terminal.warn(
-        "warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
+        "warning: in {} the error stood still above the tolerance, at {:.2g} at worst; "
         "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
         "time_step, or try another solver.method",
-        tally.stagnated, tally.floor);
+        counted(static_cast<std::size_t>(tally.stagnated), "step"), tally.floor);
   if (tally.jammed > 0)
     terminal.warn(
         "warning: in {} walls close on grains that cannot get away: no velocities keep all contacts from "
         "approaching, so these steps have no solution and ended early. Push walls with a force instead of "
         "driving them, slow them down, or remove what overlaps there",
         counted(static_cast<std::size_t>(tally.jammed), "step"));
+}
+
+std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& solver) {
+  // Comparisons are false for NaN.
+  const bool solved =
+      summary.worst_error_rms <= solver.tolerance && summary.worst_balance <= solver.balance_tolerance;
+  return fmt::format(
+      "{}{}", solved ? "Reduce time_step" : "Raise solver.max_iterations, reduce time_step",
+      summary.exit_code == exit_tolerance_missed ? ", or accept them with allow_unconverged = true" : "");
 }
 
 void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,
@@ -204,10 +213,10 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
     terminal.say(
         "{} of {} steps missed the tolerance: worst error {:.2e} (allowed {:.2g}), worst balance "
         "{:.2e} (allowed {:.2g}), worst overlap {:.2g} (allowed {:.2g}); `converged` in steps.csv says "
-        "which. Raise solver.max_iterations, reduce time_step, or accept them with allow_unconverged = "
-        "true",
+        "which. {}",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
-        summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance);
+        summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance,
+        remedy_of_misses(summary, solver));
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "

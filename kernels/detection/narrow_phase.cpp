@@ -35,7 +35,7 @@ std::int32_t count_passed(const PairView& pairs, const Domain& domain, double ti
   for (std::size_t k = 0; k < pairs.count; ++k) {
     const Pairing pair = meet(pairs, domain, k);
     through += detail::passed(pair.d, time_step * pair.v, pair.radius_i + pair.radius_j,
-                              std::min(pair.radius_i, pair.radius_j));
+                              std::min(pair.radius_i, pair.radius_j), detail::deep_of_spheres);
   }
   return through;
 }
@@ -203,12 +203,12 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
                   std::size_t chunk, InstructionSet set, Contacts& contacts) {
   const std::int32_t law = chunks.law[chunk];
   const double restitution = law == mixed_laws ? 0 : in.laws.laws()[at(law)].restitution;
-  const ChunkPhase phase{
-      in,
-      {in.time_step, in.alert, restitution, 2 * in.time_step * in.gravity.norm(), in.turning, in.reflection},
-      candidates,
-      chunks,
-      chunk};
+  const ChunkPhase phase{in,
+                         {in.time_step, in.alert, restitution, 2 * in.time_step * in.gravity.norm(),
+                          in.turning, in.reflection, !contacts.cohesion.empty()},
+                         candidates,
+                         chunks,
+                         chunk};
   if (chunks.kind[chunk] == ChunkKind::blocks)
     detail::narrow_blocks(in, phase.rule, candidates, chunks, chunk, contacts);
   else if (chunks.wall[chunk] < 0)

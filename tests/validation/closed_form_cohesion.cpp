@@ -41,6 +41,28 @@ TEST(Cohesion, ThatDoesNotHoldIsAForceInTheFrameOfItsStep) {
   EXPECT_NEAR(frame.contact_force[0][2], c, 1e-9 * weight);
 }
 
+/// What pulls through a thousandth of the radius is a well, which a ball leaves that is fast enough: also one
+/// that loses nothing as it rebounds.
+TEST(Cohesion, HoldsABallThatReboundsTooSlowlyToLeaveItAndNotAFasterOne) {
+  const double c = 10, well = c * 1e-3 * radius;
+  for (const double e : {0.0, 0.5, 0.99, 1.0})
+    for (const double share : {0.01, 0.5, 6.0}) {
+      const double speed = std::sqrt(2 * share * well / mass), step = 0.02 * 1e-3 * radius / speed;
+      Scene scene(step);
+      scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+      scene.stage().laws.set_all(cohesion_attraction, c);
+      scene.stage().laws.set_all(&PairLaw::restitution, e);
+      scene.sphere({0, 0, radius}, radius, mass, {0, 0, -speed});
+      Experiment run(std::move(scene));
+      run.steps(500);
+      const double left = e * e * share - 1;  // of the energy, behind the first rebound, over the well
+      if (left < 0)
+        EXPECT_LT(run.x()[2] - radius, 1e-3 * radius) << "e = " << e << ", " << share << " of the well";
+      else
+        EXPECT_NEAR(run.u()[2], std::sqrt(2 * left * well / mass), 0.05 * speed) << "e = " << e;
+    }
+}
+
 /// Nothing is at work but what pulls the grains together: the trifle by which a step is off is no runaway.
 TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
   constexpr double r = 0.002;

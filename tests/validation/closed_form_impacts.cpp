@@ -206,6 +206,29 @@ TEST(TwoSpheres, NormalImpactFollowsNewtonsLaw) {
   }
 }
 
+/// A sphere flies past another, wherever the steps cut its path: where the two would come deeper into one
+/// another than a step may let them, they meet, or the step was too long and says so.
+TEST(TwoSpheres, ThatFlyThroughOneAnotherInAStepAreTold) {
+  constexpr double radius = 0.1;
+  for (const double e : {0.0, 0.5, 0.9})
+    for (const double far : {2.0, 3.5, 5.0})
+      for (const double beside : {0.4, 1.2, 1.6, 1.8, 1.9, 2.05})
+        for (int cut = 0; cut < 8; ++cut) {
+          const double way = far * radius;
+          Scene scene(1);
+          scene.stage().laws.set_all(&PairLaw::restitution, e);
+          scene.sphere({-(3 + cut / 8.0) * way, beside * radius, 0}, radius, 1, {way, 0, 0});
+          scene.sphere({0, 0, 0}, radius, 1);
+          Experiment run(std::move(scene));
+          std::int64_t passed = 0;
+          for (int k = 0; k < 8; ++k) passed += run.step().passed;
+          const bool flew_on = run.u()[0] == way;
+          if (flew_on) {
+            EXPECT_EQ(passed > 0, beside < 1.95) << e << " " << far << " " << beside << " " << cut;
+          }
+        }
+}
+
 TEST(ThreeSpheres, PushingASeparatingNeighbourGivesNoEnergy) {
   // A meets B while C, in contact with B, already moves away more slowly than B will. If C's contact were
   // closed with restitution 0 and A's with e, energy would be created: (A, B, C) = (1, 0, 1/2) ends with

@@ -50,7 +50,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
               velocity_at(in, pair.second, meeting.levers.second) -
               in.domain.image_velocity(in.x[at(pair.first)], in.x[at(pair.second)]);
   meeting.passed = passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap,
-                          touch.smaller_radius);
+                          touch.smaller_radius, deep_of_blocks);
   return meeting;
 }
 

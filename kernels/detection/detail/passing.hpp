@@ -13,16 +13,21 @@ inline bool came_far(const Vec3& way, double small) {
   return !(way.squaredNorm() < 0.25 * small * small);
 }
 
-/// True when two bodies have come to overlap by more than half of `small`, the smaller radius, while the
-/// vector between their centres changed by `way` to `d`. Their overlap at the beginning does not count. From
-/// the middle of one step to that of the next the vector changes by h V-, with V- the velocity at the end of
-/// the first.
-inline bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
+/// How deep bodies are in one another when one has passed, over the smaller radius. The path of spheres is
+/// known, and a step that lets them touch leads them by: what is more than an overlap that a step may make is
+/// a pass. That of other shapes, which turn meanwhile, is a guess.
+inline constexpr double deep_of_spheres = 0.05, deep_of_blocks = 0.5;
+
+/// True when two bodies have come to overlap by more than the part `deep` of `small`, the smaller radius,
+/// while the vector between their centres changed by `way` to `d`. Their overlap at the beginning does not
+/// count. From the middle of one step to that of the next the vector changes by h V-, with V- the velocity at
+/// the end of the first.
+inline bool passed(const Vec3& d, const Vec3& way, double touching, double small, double deep) {
   if (!came_far(way, small)) return false;
   const Vec3 start = d - way;
   const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
   const double overlap = touching - (start + nearest * way).norm();
-  return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
+  return overlap - std::max(0.0, touching - start.norm()) > deep * small;
 }
 
 }  // namespace talus::detail
