@@ -15,6 +15,7 @@ void Tally::add(const Simulation& simulation) {
   const StepReport& report = simulation.report();
   exposed += simulation.exposed();
   iterating += simulation.sums().times.iteration;
+  small += simulation.sums().times.small;
   iterations += report.iterations;
   if (!report.converged) ++unconverged;
   passed += report.passed;
@@ -152,6 +153,14 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         "waiting for them took {:.1f} % of the iterations on rank 0",
         messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
         tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
+  constexpr double worth_a_word = 1;  // s, and half of the iterations
+  if (tally.small > worth_a_word && tally.small > 0.5 * tally.iterating)
+    terminal.say(
+        "direct solves of small clusters, which show how far their velocities and forces are off, took "
+        "{:.3g} of "
+        "the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
+        "(docs/certificate.md)",
+        tally.small, tally.iterating);
   if (tally.passed > 0)
     terminal.warn(
         "warning: a grain went through what it met, or deep into it, within one step, in {}; "

@@ -33,6 +33,7 @@ struct Tally {
   StepReport furthest;  ///< of the steps whose iterations did not converge the one with the worst contact
   double sufficient_time_step = 0;    ///< [s] at which they would have stayed within it; 0: not known
   double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
+  double small = 0;  ///< [s] of these: answers of small clusters, since the run began or went on
 
   /// A step that is done.
   void add(const Simulation& simulation);

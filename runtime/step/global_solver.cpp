@@ -12,6 +12,7 @@
 #include "kernels/global/balance.hpp"
 #include "kernels/global/residuals.hpp"
 #include "kernels/global/stiffness.hpp"
+#include "runtime/graph/clock.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -276,6 +277,7 @@ std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
 
 SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest) {
   const Whole span(*this);
+  const double began = graph::seconds_now();
   problems_ = checked(true);
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
   double walls = 0;
@@ -291,7 +293,12 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   // more than r is known of contacts, the free velocities of clusters hold it, and those of all bodies do
   // not.
   const bool apart = !twice_ && !knows_more(parameters_);
+  small_seconds_ += graph::seconds_now() - began;
   return {error.relative(), error.solved, error.mends, error.jammed, apart ? error.exchanged : Exchanged{}};
+}
+
+double GlobalSolver::take_small_seconds() {
+  return std::exchange(small_seconds_, 0);
 }
 
 double GlobalSolver::large_error(double enough) const {

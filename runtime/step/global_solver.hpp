@@ -66,6 +66,8 @@ class GlobalSolver {
   /// (kernels/clusters/step_error.hpp); what would mend them is kept for `correct`. In large ones of
   /// velocities (balance.hpp).
   SmallError small_error(double enough, int sweeps, double farthest);
+  /// What these answers have taken since this was asked last [s].
+  double take_small_seconds();
   double large_error(double enough) const;
   /// Of several large clusters, and the same impulses: kernels/clusters/cluster_work.hpp.
   double large_work(double speed, double interest) const;
@@ -111,6 +113,7 @@ class GlobalSolver {
   std::vector<BodyProblem> problems_;  ///< of the last small_error
   PartImpulses change_;                ///< found there [N s]
   bool mends_ = false;
+  double small_seconds_ = 0;  ///< take_small_seconds
 };
 
 /// The contact problem of the step that the state stands in or behind, with the impulses that it has found.

@@ -60,6 +60,7 @@ class SolverLoop {
   }
   /// Threads that wait for decide() call this: they take shares of ADMM's subdomains.
   void assist() { global_.assist(); }
+  double take_small_seconds() { return global_.take_small_seconds(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 

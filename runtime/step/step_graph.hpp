@@ -23,6 +23,7 @@ struct Checkpoint;
 struct StepTimes {
   double detection = 0;  ///< predicted poses, broad and narrow phase, chunks, matching
   double iteration = 0;  ///< the epoch loop
+  double small = 0;      ///< part of iteration: answers of small clusters (certificate.hpp)
   double rest = 0;       ///< integration and measures
   double dealing = 0;    ///< part of detection: partition, migration, interfaces, plan of the exchange
 };

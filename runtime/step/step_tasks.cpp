@@ -277,6 +277,7 @@ void StepGraph::sum_up() {
   imbalance_before_ = loop_.imbalance();
   sums_.times.detection = iterating_ - started_;
   sums_.times.iteration = iterated_ - iterating_;
+  sums_.times.small = loop_.take_small_seconds();
   sums_.times.rest = graph::seconds_now() - iterated_;
 }
 
