@@ -191,7 +191,8 @@ Section<SampleSpec> sample_keys() {
                      .only("kind is not bodies or state", made)
                      .blank_when_zero()
                      .or_else("`[0.0, 0.0, 0.0]`"));
-  keys.push_back(key<S>("angular_velocity", "rad/s", any, "Angular velocity of all grains at the beginning.",
+  keys.push_back(key<S>("angular_velocity", "rad/s", any,
+                        "Angular velocity of all grains at the beginning. Clumps begin without.",
                         &S::angular_velocity)
                      .only("kind is not bodies or state", made)
                      .blank_when_zero()
