@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -70,7 +71,7 @@ ordered_json status_of(const std::filesystem::path& directory) {
 }
 
 std::string hours(double seconds) {
-  const auto total = static_cast<std::int64_t>(seconds);
+  const auto total = static_cast<std::int64_t>(std::ceil(seconds));
   return fmt::format("{}:{:02}:{:02}", total / 3600, total / 60 % 60, total % 60);
 }
 
@@ -82,7 +83,8 @@ std::string sentence_of(const std::string& state) {
 }
 
 void print(const ordered_json& status) {
-  std::string text = fmt::format("{}\n", sentence_of(status["state"].get<std::string>()));
+  const auto state = status["state"].get<std::string>();
+  std::string text = fmt::format("{}\n", sentence_of(state));
   if (const std::string message = status.value("message", ""); !message.empty()) text += message + '\n';
   if (status.contains("stage"))
     text += fmt::format("stage '{}', {:.0f} % done\n", status["stage"].get<std::string>(),
@@ -90,7 +92,7 @@ void print(const ordered_json& status) {
   text += fmt::format("step {}, {:.6g} s simulated, {} steps missed the tolerance\n",
                       status["step"].get<std::int64_t>(), status["time"].get<double>(),
                       status["missed_steps"].get<std::int64_t>());
-  if (status.contains("steps_per_s"))
+  if (state != "dead" && status.contains("steps_per_s"))
     text += fmt::format("{:.3g} steps a second", status["steps_per_s"].get<double>()) +
             (status.contains("stage_eta_s")
                  ? fmt::format(", the stage takes {} more\n", hours(status["stage_eta_s"].get<double>()))

@@ -280,10 +280,11 @@ class SceneReader {
       const auto wall = std::ranges::find(walls, name, &Wall::name);
       const auto gone = std::ranges::find(stages, wall->until_stage, &Stage::name);
       if (wall->absent && gone - stages.begin() <= static_cast<std::ptrdiff_t>(k))
-        fail_at(*entry->get("wall"), fmt::format("{}[{}].wall", path, at),
-                fmt::format("wall '{}' is gone with the beginning of stage '{}' (until_stage). Leave this load "
-                            "out, or let the wall stay longer",
-                            name, wall->until_stage));
+        fail_at(
+            *entry->get("wall"), fmt::format("{}[{}].wall", path, at),
+            fmt::format("wall '{}' is gone with the beginning of stage '{}' (until_stage). Leave this load "
+                        "out, or let the wall stay longer",
+                        name, wall->until_stage));
       ++at;
     }
   }

@@ -94,6 +94,7 @@ TEST_F(Resume, IsNotWaitedForByASecondSignal) {
   EXPECT_TRUE(WIFSIGNALED(status)) << status;
   const Outcome told = run("status twice");
   EXPECT_NE(told.output.find("dead"), std::string::npos) << told.output;
+  EXPECT_EQ(told.output.find("a second"), std::string::npos) << "it goes no further: " << told.output;
 }
 
 TEST_F(Resume, BeforeTheTimeIsUp) {
