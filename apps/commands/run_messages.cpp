@@ -15,6 +15,7 @@ void Tally::add(const Simulation& simulation) {
   const StepReport& report = simulation.report();
   exposed += simulation.exposed();
   iterating += simulation.sums().times.iteration;
+  lately += simulation.sums().times.iteration;
   small += simulation.sums().times.small;
   iterations += report.iterations;
   if (!report.converged) ++unconverged;
@@ -154,13 +155,14 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
         tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
   constexpr double worth_a_word = 1;  // s, and half of the iterations
-  if (tally.small > worth_a_word && tally.small > 0.5 * tally.iterating)
+  if (simulation.setup().solver.direct_bodies > 0 && tally.small > worth_a_word &&
+      tally.small > 0.5 * tally.lately)
     terminal.say(
         "direct solves of small clusters, which show how far their velocities and forces are off, took "
         "{:.3g} of "
         "the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
         "(docs/certificate.md)",
-        tally.small, tally.iterating);
+        tally.small, tally.lately);
   if (tally.passed > 0)
     terminal.warn(
         "warning: a grain went through what it met, or deep into it, within one step, in {}; "
@@ -195,12 +197,11 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         counted(static_cast<std::size_t>(tally.jammed), "step"));
 }
 
-std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& solver) {
-  // Comparisons are false for NaN.
-  const bool solved =
-      summary.worst_error_rms <= solver.tolerance && summary.worst_balance <= solver.balance_tolerance;
+/// Overlaps are a matter of the time step alone.
+std::string remedy_of_misses(const io::Summary& summary) {
+  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
   return fmt::format(
-      "{}{}", solved ? "Reduce time_step" : "Raise solver.max_iterations, reduce time_step",
+      "{}{}", overlaps_alone ? "Reduce time_step" : "Raise solver.max_iterations, reduce time_step",
       summary.exit_code == exit_tolerance_missed ? ", or accept them with allow_unconverged = true" : "");
 }
 
@@ -225,7 +226,7 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         "which. {}",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
         summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance,
-        remedy_of_misses(summary, solver));
+        remedy_of_misses(summary));
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "

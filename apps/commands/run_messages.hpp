@@ -33,7 +33,8 @@ struct Tally {
   StepReport furthest;  ///< of the steps whose iterations did not converge the one with the worst contact
   double sufficient_time_step = 0;    ///< [s] at which they would have stayed within it; 0: not known
   double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
-  double small = 0;  ///< [s] of these: answers of small clusters, since the run began or went on
+  double lately = 0, small = 0;       ///< [s] since the run began or went on: in the iterations; of these for
+                                      ///< answers of small clusters
 
   /// A step that is done.
   void add(const Simulation& simulation);

@@ -59,7 +59,10 @@ ordered_json status_of(const std::filesystem::path& directory) {
     for (const char* key : {"stage", "stage_fraction"})
       if (beat.contains(key)) status[key] = beat[key];
   if (!ended)
-    for (const char* key : {"steps_per_s", "stage_eta_s", "pid", "host", "heartbeat"})
+    for (const char* key : {"pid", "host", "heartbeat"})
+      if (beat.contains(key)) status[key] = beat[key];
+  if (!ended && state != "dead")
+    for (const char* key : {"steps_per_s", "stage_eta_s"})
       if (beat.contains(key)) status[key] = beat[key];
   if (ended) {
     status["exit_code"] = summary.value("exit_code", 0);
@@ -83,8 +86,7 @@ std::string sentence_of(const std::string& state) {
 }
 
 void print(const ordered_json& status) {
-  const auto state = status["state"].get<std::string>();
-  std::string text = fmt::format("{}\n", sentence_of(state));
+  std::string text = fmt::format("{}\n", sentence_of(status["state"].get<std::string>()));
   if (const std::string message = status.value("message", ""); !message.empty()) text += message + '\n';
   if (status.contains("stage"))
     text += fmt::format("stage '{}', {:.0f} % done\n", status["stage"].get<std::string>(),
@@ -92,7 +94,7 @@ void print(const ordered_json& status) {
   text += fmt::format("step {}, {:.6g} s simulated, {} steps missed the tolerance\n",
                       status["step"].get<std::int64_t>(), status["time"].get<double>(),
                       status["missed_steps"].get<std::int64_t>());
-  if (state != "dead" && status.contains("steps_per_s"))
+  if (status.contains("steps_per_s"))
     text += fmt::format("{:.3g} steps a second", status["steps_per_s"].get<double>()) +
             (status.contains("stage_eta_s")
                  ? fmt::format(", the stage takes {} more\n", hours(status["stage_eta_s"].get<double>()))

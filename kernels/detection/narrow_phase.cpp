@@ -8,6 +8,7 @@
 #include "kernels/detection/detail/gap_kernels.hpp"
 #include "kernels/detection/detail/passing.hpp"
 #include "kernels/detection/materials.hpp"
+#include "kernels/law/attraction.hpp"
 #include "kernels/law/gap_law.hpp"
 #include "kernels/simd/contact_view.hpp"
 
@@ -49,6 +50,14 @@ FindGaps kernel_of(InstructionSet set) {
 
 MaterialView materials_of(const NarrowPhase& in) {
   return {in.material, in.walls};
+}
+
+/// How far cohesion reaches in a chunk, over the smaller radius: 0 where no pair of it has any.
+double reach_of(const PairTable& laws, std::int32_t law) {
+  const auto attracts = [](const PairLaw& of) { return of.cohesion_of({1, 1}) > 0; };
+  const bool any =
+      law == mixed_laws ? std::ranges::any_of(laws.laws(), attracts) : attracts(laws.laws()[at(law)]);
+  return any ? CohesionRule{}.reach : 0;
 }
 
 /// Input of the narrow phase of one chunk.
@@ -133,7 +142,8 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity_at(in.x[i]));
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
-    const GapResult<double> found = solve_gap(rule, gap, v_n, v_n + fall, restitution_at(phase, pair));
+    const GapResult<double> found =
+        solve_gap(rule, gap, v_n, v_n + fall, restitution_at(phase, pair), rule.reach * in.radius[i]);
     if (found.absent) continue;
     contacts.bias[place] = found.bias;
     contacts.nx[place] = wall.normal[0];
@@ -181,8 +191,9 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
     through += passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
-    const GapResult<double> found = solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v),
-                                              point->normal.dot(free), restitution_at(phase, pair));
+    const GapResult<double> found =
+        solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),
+                  restitution_at(phase, pair), rule.reach * in.radius[i]);
     if (found.absent) continue;
     contacts.bias[place] = found.bias;
     contacts.nx[place] = point->normal[0];
@@ -205,7 +216,7 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
   const double restitution = law == mixed_laws ? 0 : in.laws.laws()[at(law)].restitution;
   const ChunkPhase phase{in,
                          {in.time_step, in.alert, restitution, 2 * in.time_step * in.gravity.norm(),
-                          in.turning, in.reflection, !contacts.cohesion.empty()},
+                          in.turning, in.reflection, reach_of(in.laws, law)},
                          candidates,
                          chunks,
                          chunk};

@@ -16,6 +16,12 @@ struct TouchingRadii {
   double reduced() const { return std::isinf(second) ? first : first * second / (first + second); }
 };
 
+struct CohesionRule {
+  /// Bodies touch where the gap is at most this part of the smaller radius. Rounding and the tolerance of a
+  /// step open the contacts of a chain under tension by a small part of it, and cohesion closes them again.
+  double reach = 1e-3;
+};
+
 struct Attraction {
   const char* name;      ///< key of [material] and [[pair]]
   const char* unit;      ///< of its number, which is >= 0 and 0 where the law does not hold

@@ -17,7 +17,7 @@ struct GapRule {
   double slow;         ///< [m/s] no restitution up to here
   double turning = std::numeric_limits<double>::infinity();  ///< [m] an impact turns no earlier than this
   double reflection = 0;  ///< E of Moreau's law (restitution_law.hpp); 0: the bias is that of v_n
-  bool pulls = false;     ///< contacts have cohesion, which also pairs that part must feel
+  double reach = 0;       ///< of cohesion, over the smaller radius; 0: these pairs have none
 };
 
 namespace {
@@ -43,22 +43,22 @@ struct GapResult {
 /// faster than `slow` that touches, or would meet within the step, follows the impact law instead, b = e v_n:
 /// once braked to g/h, it would have lost the speed that is to rebound. Where it is as far as `turning`
 /// others may stand between, and it flies on until it overlaps. Pairs that others push together within the
-/// step are braked; that costs energy, so with e = 1 they fly on, too, unless contacts pull. `v_n` [m/s] is
-/// the normal velocity at the beginning of the step, `v_n_free` the one at its end without contacts.
-/// `restitution` is a number, or one per lane.
+/// step are braked; that costs energy, so with e = 1 they fly on, too, but within `reach` [m], where they may
+/// be pulled back. `v_n` [m/s] is the normal velocity at the beginning of the step, `v_n_free` the one at its
+/// end without contacts. `restitution` is a number, or one per lane.
 template <class V, class E>
 [[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free,
-                                                     E restitution) {
+                                                     E restitution, V reach = {}) {
   BitsOf<V> absent = stays_apart(gap, v_n_free, rule.time_step, rule.alert);
   V bias = positive_part(gap) / rule.time_step;
   // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
   // between both would gain energy.
-  const double least = rule.pulls ? std::numeric_limits<double>::infinity() : 1;  // e of those that fly on
   const auto impact = [&](BitsOf<V> quick) {
     const BitsOf<V> closes = (v_n < 0) & (gap < -rule.time_step * v_n_free);
     const BitsOf<V> meets = (gap <= 0) | (closes & (gap < rule.turning));
     bias = (quick & meets) ? restitution * v_n : bias;
-    absent |= quick & (meets == BitsOf<V>{}) & (closes | (V{} + restitution >= least));
+    absent |= quick & (meets == BitsOf<V>{}) &
+              (closes | ((V{} + restitution >= 1) & ((gap > reach) | (reach <= 0))));
   };
   if constexpr (std::same_as<E, double>) {
     if (restitution > 0) impact(absolute(v_n) > rule.slow);

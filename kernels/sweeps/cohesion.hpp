@@ -16,12 +16,6 @@
 
 namespace talus {
 
-struct CohesionRule {
-  /// Bodies touch where the gap is at most this part of the smaller radius. Rounding and the tolerance of a
-  /// step open the contacts of a chain under tension by a small part of it, and cohesion closes them again.
-  double reach = 1e-3;
-};
-
 /// Fills Contacts::cohesion of a chunk, c h [N s] (c h/(1 + E) with Moreau's restitution), 0 for contacts
 /// that do not touch. Does nothing where the array is empty.
 void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,

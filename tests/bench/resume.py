@@ -12,6 +12,7 @@ Ends after --minutes, and says how many trials there were. Exit code 1 where one
 """
 
 import argparse
+import collections
 import csv
 import json
 import os
@@ -59,9 +60,19 @@ def processes(folder):
     return found
 
 
+def signalled(pid):
+    """Whether there was such a process to kill."""
+    try:
+        os.kill(pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 class Runner:
     def __init__(self, options):
         self.options = options
+        self.kills = collections.Counter()  # by ranks, and whether there was a checkpoint
 
     def command(self, folder, ranks, threads, more):
         command = [self.options.talus, "run", self.options.scene, "--out", folder, "--quiet", "--threads", threads]
@@ -73,25 +84,22 @@ class Runner:
         return [str(word) for word in command + more]
 
     def kill(self, folder, ranks, threads, after, draw):
-        """Begins a run and kills one of its processes after so many seconds. None, or what was left running."""
+        """Begins a run and kills one of its processes after so many seconds. Whether there was one, and what went
+        wrong or None: a run that ended by itself has to have ended well, and one that was killed within ten seconds."""
         command = self.command(folder, ranks, threads, ["--resume"])
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(after)
-        if alive := processes(folder):
-            try:
-                os.kill(draw.choice(sorted(alive)), signal.SIGKILL)
-            except ProcessLookupError:
-                pass
+        if process.poll() is not None:
+            return False, None if process.returncode in (0, 3) else f"exit {process.returncode}"
+        hit = signalled(draw.choice(sorted(processes(folder)) or [process.pid]))
         until = time.monotonic() + 10
-        while time.monotonic() < until:
+        while (left := processes(folder)) and time.monotonic() < until:
             process.poll()
-            if not (left := processes(folder)):
-                return None
             time.sleep(0.05)
         for pid in left:
-            os.kill(pid, signal.SIGKILL)
+            signalled(pid)
         process.wait()
-        return f"{len(left)} processes ran on after a kill"
+        return hit, f"{len(left)} processes ran on after a kill" if left else None
 
     def run(self, folder, ranks, threads, more):
         command = self.command(folder, ranks, threads, more)
@@ -118,9 +126,14 @@ def killed(runner, folder, seconds, draw):
     for _ in range(draw.randint(*runner.options.stops)):
         ranks = draw.randint(1, 2)
         after = draw.uniform(0, seconds)
-        history.append(f"killed after {after:.2f} s on {ranks} ranks")
-        if failure := runner.kill(folder, ranks, 1, after, draw):
+        hit, failure = runner.kill(folder, ranks, 1, after, draw)
+        saved = any(folder.glob("checkpoint*"))
+        runner.kills[ranks, saved] += hit
+        history.append(f"{'killed' if hit else 'done'} after {after:.2f} s on {ranks} ranks")
+        if failure:
             return history, failure
+        if not hit:
+            break
     history.append("end on 1x1")
     code = runner.run(folder, 1, 1, ["--resume"])
     return history, None if code in (0, 3) else code
@@ -162,6 +175,7 @@ def main():
     parser.add_argument("--kill", action="store_true")
     options = parser.parse_args()
     until = time.monotonic() + 60 * options.minutes
+    options.out = options.out.resolve()
     options.out.mkdir(parents=True, exist_ok=True)
     runner, draw = Runner(options), random.Random(options.seed)
 
@@ -189,7 +203,10 @@ def main():
         if failure is not None:
             folder.rename(options.out / f"wrong-{done}")
     print(f"{done} of {options.trials} trials, {wrong} wrong")
-    return 1 if wrong or done == 0 else 0
+    for (ranks, saved), kills in sorted(runner.kills.items()):
+        print(f"{kills} kills on {ranks} ranks {'behind' if saved else 'before'} a checkpoint")
+    void = options.kill and not all(runner.kills[ranks, True] for ranks in (1, 2))
+    return 1 if wrong or done == 0 or void else 0
 
 
 if __name__ == "__main__":

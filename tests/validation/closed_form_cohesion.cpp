@@ -63,6 +63,26 @@ TEST(Cohesion, HoldsABallThatReboundsTooSlowlyToLeaveItAndNotAFasterOne) {
     }
 }
 
+/// Beyond the reach of cohesion an elastic grain pushes others as if there were none: with a contact there,
+/// that parts, the last one would be braked.
+TEST(Cohesion, TakesNoEnergyFromElasticGrainsBeyondItsReach) {
+  constexpr double r = 0.01;
+  for (const RestitutionLaw law : {RestitutionLaw::moreau, RestitutionLaw::newton})
+    for (const double last : {0.0401, 0.04012, 0.0403, 0.0406}) {
+      Scene scene(h);
+      scene.setup.solver.restitution_law = law;
+      scene.stage().laws.set_all(cohesion_attraction, 1e-9);
+      scene.stage().laws.set_all(&PairLaw::restitution, 1);
+      scene.sphere({0, 0, 0}, r, 0.01, {1, 0, 0});
+      scene.sphere({0.0201, 0, 0}, r, 0.01);
+      scene.sphere({last, 0, 0}, r, 0.01, {0.1, 0, 0});
+      Experiment run(std::move(scene));
+      const double before = run.kinetic_energy();
+      run.steps(50);
+      EXPECT_NEAR(run.kinetic_energy(), before, 1e-6 * before) << last;
+    }
+}
+
 /// Nothing is at work but what pulls the grains together: the trifle by which a step is off is no runaway.
 TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
   constexpr double r = 0.002;

@@ -36,8 +36,10 @@ void check_random(const toml::table& table, const std::string& path, const Sampl
     if (!sample.region && edge == 0)
       fail_at(table, path + ".region",
               fmt::format("missing; random grains need a box, since nothing repeats along {}", "xyz"[axis]));
-    constexpr double rounded = 1 + 1e-12;  // of corners that are written in decimals
-    if (sample.region && edge > 0 && sample.region->high[axis] - sample.region->low[axis] > rounded * edge)
+    if (!sample.region || edge == 0) continue;
+    const double low = sample.region->low[axis], high = sample.region->high[axis];
+    constexpr double rounding = 1e-12;  // of corners that are written in decimals
+    if (high - low > edge + rounding * std::max({std::abs(low), std::abs(high), edge}))
       fail_at(*table.get("region"), path + ".region",
               fmt::format("is longer along {} than the cell, {} m", "xyz"[axis], edge));
   }

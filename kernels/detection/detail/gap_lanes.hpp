@@ -104,7 +104,9 @@ template <class V, class S, class E>
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
                       off ? pair.d.z / distance : V{} + 1.0};
   const V gap = distance - pair.radius_i - pair.radius_j, v_n = dot(n, pair.v);
-  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n, restitution);  // gravity moves both alike
+  const V small = pair.radius_j < pair.radius_i ? pair.radius_j : pair.radius_i;
+  // Gravity moves both alike.
+  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n, restitution, rule.reach * small);
   store(out.nx + at, n.x);
   store(out.ny + at, n.y);
   store(out.nz + at, n.z);
@@ -112,7 +114,6 @@ template <class V, class S, class E>
   const BitsOf<V> contact = ~found.absent;
   __builtin_memcpy(out.contact + at, &contact, sizeof(contact));
   const Space<V> way = (V{} + rule.time_step) * pair.v;
-  const V small = pair.radius_j < pair.radius_i ? pair.radius_j : pair.radius_i;
   return ~(dot(way, way) < 0.25 * small * small);
 }
 

@@ -13,21 +13,23 @@ inline bool came_far(const Vec3& way, double small) {
   return !(way.squaredNorm() < 0.25 * small * small);
 }
 
-/// How deep bodies are in one another when one has passed, over the smaller radius. The path of spheres is
-/// known, and a step that lets them touch leads them by: what is more than an overlap that a step may make is
-/// a pass. That of other shapes, which turn meanwhile, is a guess.
-inline constexpr double deep_of_spheres = 0.05, deep_of_blocks = 0.5;
+/// How deep bodies are in one another when one has passed, over the smaller radius: those that still come
+/// straight at one another, within 60 degrees, whom the contact of this step turns back; and other spheres,
+/// as nothing has turned them where they met (0.05: an overlap that a step may make). Other shapes turn
+/// meanwhile, so where they were nearest is a guess.
+inline constexpr double deep_coming = 0.5, deep_of_spheres = 0.05, deep_of_blocks = 0.5;
 
-/// True when two bodies have come to overlap by more than the part `deep` of `small`, the smaller radius,
-/// while the vector between their centres changed by `way` to `d`. Their overlap at the beginning does not
-/// count. From the middle of one step to that of the next the vector changes by h V-, with V- the velocity at
-/// the end of the first.
+/// True when two bodies have come to overlap by more than the part `deep_coming`, or `deep` where they no
+/// longer come straight, of `small`, the smaller radius, while the vector between their centres changed by
+/// `way` to `d`. Their overlap at the beginning does not count. From the middle of one step to that of the
+/// next the vector changes by h V-, with V- the velocity at the end of the first.
 inline bool passed(const Vec3& d, const Vec3& way, double touching, double small, double deep) {
   if (!came_far(way, small)) return false;
   const Vec3 start = d - way;
   const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const bool coming = -d.dot(way) > 0.5 * d.norm() * way.norm();
   const double overlap = touching - (start + nearest * way).norm();
-  return overlap - std::max(0.0, touching - start.norm()) > deep * small;
+  return overlap - std::max(0.0, touching - start.norm()) > (coming ? deep_coming : deep) * small;
 }
 
 }  // namespace talus::detail
