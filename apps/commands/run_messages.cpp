@@ -159,8 +159,8 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
       tally.small > 0.5 * tally.lately)
     terminal.say(
         "direct solves of small clusters, which show how far their velocities and forces are off, took "
-        "{:.3g} of "
-        "the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
+        "{:.3g} "
+        "of the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
         "(docs/certificate.md)",
         tally.small, tally.lately);
   if (tally.passed > 0)

@@ -58,7 +58,7 @@ template <class V, class E>
     const BitsOf<V> meets = (gap <= 0) | (closes & (gap < rule.turning));
     bias = (quick & meets) ? restitution * v_n : bias;
     absent |= quick & (meets == BitsOf<V>{}) &
-              (closes | ((V{} + restitution >= 1) & ((gap > reach) | (reach <= 0))));
+              (closes | ((V{} + restitution >= 1) & ((gap <= reach) == BitsOf<V>{})));
   };
   if constexpr (std::same_as<E, double>) {
     if (restitution > 0) impact(absolute(v_n) > rule.slow);

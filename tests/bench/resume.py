@@ -4,11 +4,12 @@
     tests/bench/resume.py OUT [--talus build/release/talus] [--trials 100] [--stops 1,1] [--minutes 30] [--patience 300] [--seed 1]
                           [--scene apps/scenes/demo.toml] [--subdomains 4] [--set KEY=VALUE ...] [--kill]
 
-With --kill a run does not stop behind a step: one of its processes, a rank or mpirun, gets SIGKILL at any moment, and all
-of them have to be gone within ten seconds. The digest of the end, and every CSV file but for its columns of wall-clock time, must be equal. `--stops 10,10`: ten
-resumptions in a row. A line a trial tells what was done. A run that writes nothing for --patience seconds is called
-hung; on cores that others use two ranks that wait for one another may take hundreds of times their processor time.
-Ends after --minutes, and says how many trials there were. Exit code 1 where one differs, fails or hangs.
+The digest of the end, and every CSV file but for its columns of wall-clock time, must be equal. `--stops 10,10`: ten
+resumptions in a row. With --kill a run does not stop behind a step: one of its processes, a rank or mpirun, gets SIGKILL
+at any moment, and all of them have to be gone within ten seconds. A line a trial tells what was done. A run that writes
+nothing for --patience seconds is called hung; on cores that others use two ranks that wait for one another may take
+hundreds of times their processor time. Ends after --minutes, and says how many trials there were. Exit code 1 where one
+differs, fails or hangs, or no kill hit a run behind a checkpoint, on one rank or on two.
 """
 
 import argparse
@@ -201,7 +202,10 @@ def main():
         wrong += failure is not None
         print(f"{done}: {'; '.join(history)}: {failure or 'equal'}", flush=True)
         if failure is not None:
-            folder.rename(options.out / f"wrong-{done}")
+            kept = options.out / f"wrong-{done}"
+            shutil.rmtree(kept, ignore_errors=True)
+            if folder.exists():
+                folder.rename(kept)
     print(f"{done} of {options.trials} trials, {wrong} wrong")
     for (ranks, saved), kills in sorted(runner.kills.items()):
         print(f"{kills} kills on {ranks} ranks {'behind' if saved else 'before'} a checkpoint")

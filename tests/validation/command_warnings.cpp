@@ -104,6 +104,7 @@ TEST_F(Warnings, NameTheOverlapOfAStepThatIsTooLongAndTheStepThatWouldDo) {
                             "smaller radius, of body 42 and wall 'floor' in step 1"),
       std::string::npos)
       << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("max_iterations"), std::string::npos) << "sweeps are no help";
   const Table steps = read_table(at("results/steps.csv"));
   double worst = 0;
   for (std::size_t k = 0; k < steps.rows.size(); ++k) {

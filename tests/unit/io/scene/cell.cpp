@@ -174,6 +174,16 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
          "did you mean 'lengths'?");
 }
 
+TEST(CellScene, RandomGrainsMayFillTheCellWhereverItLies) {
+  const std::string box = "[sample.region]\nshape = \"box\"\nlow = [0.1, -0.2, 1000.3]\nhigh = ";
+  const std::string there = replaced(replaced(cube, "[0.1, 0.1, 0.1]", "[0.08, 0.08, 0.08]"), "[sample]",
+                                     "origin = [0.1, -0.2, 1000.3]\n[sample]");
+  EXPECT_NO_THROW(parsed(replaced(there, "[[stage]]", box + "[0.18, -0.12, 1000.38]\n[[stage]]")))
+      << "-0.12 + 0.2 is more than 0.08 in binary";
+  refuse(replaced(there, "[[stage]]", box + "[0.18, -0.1199999, 1000.38]\n[[stage]]"), "sample.region",
+         "is longer along y than the cell");
+}
+
 TEST(CellScene, RandomGrainsBetweenWallsNeedABox) {
   std::string text = replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]");
   text = replaced(text, "[[stage]]", R"([sample.region]
