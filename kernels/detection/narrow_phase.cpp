@@ -8,7 +8,6 @@
 #include "kernels/detection/detail/gap_kernels.hpp"
 #include "kernels/detection/detail/passing.hpp"
 #include "kernels/detection/materials.hpp"
-#include "kernels/law/attraction.hpp"
 #include "kernels/law/gap_law.hpp"
 #include "kernels/simd/contact_view.hpp"
 
@@ -52,14 +51,6 @@ MaterialView materials_of(const NarrowPhase& in) {
   return {in.material, in.walls};
 }
 
-/// How far cohesion reaches in a chunk, over the smaller radius: 0 where no pair of it has any.
-double reach_of(const PairTable& laws, std::int32_t law) {
-  const auto attracts = [](const PairLaw& of) { return of.cohesion_of({1, 1}) > 0; };
-  const bool any =
-      law == mixed_laws ? std::ranges::any_of(laws.laws(), attracts) : attracts(laws.laws()[at(law)]);
-  return any ? CohesionRule{}.reach : 0;
-}
-
 /// Input of the narrow phase of one chunk.
 struct ChunkPhase {
   const NarrowPhase& in;
@@ -69,15 +60,20 @@ struct ChunkPhase {
   std::size_t chunk;
 };
 
-/// Restitution of each pair of a chunk that mixes laws, in the places of `contacts`; empty for other chunks.
-std::vector<double> own_restitution(const ChunkPhase& phase, std::span<const ContactBody> first,
-                                    std::span<const ContactBody> second) {
-  std::vector<double> own;
-  const Chunks& chunks = phase.chunks;
-  if (chunks.law[phase.chunk] != mixed_laws) return own;
+/// Of each pair of a chunk that mixes laws, in the places of `contacts`; empty for other chunks.
+struct OwnLaws {
+  std::vector<double> restitution, reach;
+};
+OwnLaws own_laws(const ChunkPhase& phase, std::span<const ContactBody> first,
+                 std::span<const ContactBody> second) {
+  OwnLaws own;
+  if (phase.chunks.law[phase.chunk] != mixed_laws) return own;
   const MaterialView materials = materials_of(phase.in);
-  for (std::size_t k = 0; k < first.size(); ++k)
-    own.push_back(phase.in.laws.laws()[materials.law(GrainPair{first[k], second[k]})].restitution);
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    const PairLaw& law = phase.in.laws.laws()[materials.law(GrainPair{first[k], second[k]})];
+    own.restitution.push_back(law.restitution);
+    own.reach.push_back(law.reach());
+  }
   return own;
 }
 
@@ -88,14 +84,15 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
              second = std::span<const ContactBody>(contacts.second).subspan(begin, count);
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == record_numbers * sizeof(double));
-  const std::vector<double> restitution = own_restitution(phase, first, second);
+  const OwnLaws own = own_laws(phase, first, second);
   const PairView pairs{in.x.data()->data(),
                        in.radius.data(),
                        in.velocity.data()->u,
                        record_places(first.data()),
                        record_places(second.data()),
                        count,
-                       restitution.empty() ? nullptr : restitution.data(),
+                       own.restitution.empty() ? nullptr : own.restitution.data(),
+                       own.reach.empty() ? nullptr : own.reach.data(),
                        in.domain.repeats ? &in.domain.cell : nullptr,
                        in.domain.flows ? &in.domain.rates : nullptr};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
@@ -112,9 +109,9 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
   }
 }
 
-/// Restitution of a grain at a wall.
-double restitution_at(const ChunkPhase& phase, const WallPair& pair) {
-  return phase.in.laws.laws()[materials_of(phase.in).law(pair)].restitution;
+/// The law of a grain at a wall.
+const PairLaw& law_of(const ChunkPhase& phase, const WallPair& pair) {
+  return phase.in.laws.laws()[materials_of(phase.in).law(pair)];
 }
 
 /// Writes the velocity of the wall's material beyond that of the wall, where contacts have room for it.
@@ -142,8 +139,9 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity_at(in.x[i]));
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
+    const PairLaw& law = law_of(phase, pair);
     const GapResult<double> found =
-        solve_gap(rule, gap, v_n, v_n + fall, restitution_at(phase, pair), rule.reach * in.radius[i]);
+        solve_gap(rule, gap, v_n, v_n + fall, law.restitution, law.reach() * in.radius[i]);
     if (found.absent) continue;
     contacts.bias[place] = found.bias;
     contacts.nx[place] = wall.normal[0];
@@ -191,9 +189,10 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
     through += passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
+    const PairLaw& law = law_of(phase, pair);
     const GapResult<double> found =
         solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),
-                  restitution_at(phase, pair), rule.reach * in.radius[i]);
+                  law.restitution, law.reach() * in.radius[i]);
     if (found.absent) continue;
     contacts.bias[place] = found.bias;
     contacts.nx[place] = point->normal[0];
@@ -213,10 +212,10 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, InstructionSet set, Contacts& contacts) {
   const std::int32_t law = chunks.law[chunk];
-  const double restitution = law == mixed_laws ? 0 : in.laws.laws()[at(law)].restitution;
+  const PairLaw one = law == mixed_laws ? PairLaw{} : in.laws.laws()[at(law)];
   const ChunkPhase phase{in,
-                         {in.time_step, in.alert, restitution, 2 * in.time_step * in.gravity.norm(),
-                          in.turning, in.reflection, reach_of(in.laws, law)},
+                         {in.time_step, in.alert, one.restitution, 2 * in.time_step * in.gravity.norm(),
+                          in.turning, in.reflection, one.reach()},
                          candidates,
                          chunks,
                          chunk};

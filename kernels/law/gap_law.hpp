@@ -17,7 +17,7 @@ struct GapRule {
   double slow;         ///< [m/s] no restitution up to here
   double turning = std::numeric_limits<double>::infinity();  ///< [m] an impact turns no earlier than this
   double reflection = 0;  ///< E of Moreau's law (restitution_law.hpp); 0: the bias is that of v_n
-  double reach = 0;       ///< of cohesion, over the smaller radius; 0: these pairs have none
+  double reach = 0;       ///< of cohesion over the smaller radius, where pairs have none of their own
 };
 
 namespace {

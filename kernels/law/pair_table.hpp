@@ -28,6 +28,8 @@ struct PairLaw {
       if (attraction[k] > 0) c += attractions[k]->force(attraction[k], radii);
     return c;
   }
+  /// How far two bodies still hold one another, over the smaller radius; 0 without attraction.
+  double reach() const { return cohesion_of({1, 1}) > 0 ? CohesionRule{}.reach : 0; }
 };
 
 /// One number of a law: a member, or that of an attraction.

@@ -83,6 +83,23 @@ TEST(Cohesion, TakesNoEnergyFromElasticGrainsBeyondItsReach) {
     }
 }
 
+/// Nor from pairs without cohesion that stand in one chunk with pairs that have it.
+TEST(Cohesion, TakesNoEnergyFromElasticGrainsOfAnotherMaterial) {
+  constexpr double r = 0.01;
+  Scene scene(h);
+  scene.stage().laws = PairTable(2, {.restitution = 1});
+  LawNumber(cohesion_attraction).in(scene.stage().laws.between(material_of_grains, material_of_grains)) =
+      1e-9;
+  scene.sphere({0, 0, 0}, r, 0.01, {1, 0, 0});
+  scene.sphere({0.0201, 0, 0}, r, 0.01);
+  scene.sphere({0.020105 + 2 * r, 0, 0}, r, 0.01, {0.1, 0, 0});
+  scene.bodies.material = {material_of_grains, material_of_grains, material_of_walls};
+  Experiment run(std::move(scene));
+  const double before = run.kinetic_energy();
+  run.steps(50);
+  EXPECT_NEAR(run.kinetic_energy(), before, 1e-6 * before);
+}
+
 /// Nothing is at work but what pulls the grains together: the trifle by which a step is off is no runaway.
 TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
   constexpr double r = 0.002;

@@ -116,9 +116,10 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     if (wall && !has_feature(in, candidates.wall_pairs[k - grains], meeting)) continue;
     through += meeting.passed ? 1 : 0;
     const double v_n = meeting.touch.normal.dot(meeting.v);
-    const GapResult<double> found = solve_gap(
-        rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall),
-        law_at(in.laws, candidates, materials, k).restitution, rule.reach * meeting.touch.smaller_radius);
+    const PairLaw& law = law_at(in.laws, candidates, materials, k);
+    const GapResult<double> found =
+        solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall), law.restitution,
+                  law.reach() * meeting.touch.smaller_radius);
     if (found.absent) continue;
     if (wall && !contacts.vx.empty())
       set_drift(contacts, place,

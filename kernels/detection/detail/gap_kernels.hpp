@@ -21,7 +21,8 @@ struct PairView {
   const double* velocity;               ///< record_numbers per body: its record
   const std::uint32_t *first, *second;  ///< per pair: where the records of its bodies begin, in numbers
   std::size_t count;                    ///< of pairs
-  const double* restitution = nullptr;  ///< per pair; null: all have that of the rule
+  const double* restitution = nullptr;  ///< per pair; null: all have that of the rule, and its reach
+  const double* reach = nullptr;        ///< likewise (GapRule::reach)
   const PeriodicSpace* cell = nullptr;  ///< null: between walls
   const EdgeRates* rates = nullptr;     ///< null: the cell does not change
 };

@@ -62,19 +62,25 @@ template <std::same_as<Octet> V>
   return {{c[0], c[1], c[2]}, {c[4], c[5], c[6]}, radius_i, radius_j};
 }
 
-/// Restitution of all pairs, or of each its own.
-struct OneRestitution {
-  double value;
+/// Restitution, and how far cohesion reaches over the smaller radius; E is a number, or one per lane.
+template <class E>
+struct GapLaw {
+  E restitution, reach;
+};
+
+/// That of all pairs, or of each its own.
+struct OneLaw {
+  GapLaw<double> value;
   template <class V, class Only>
-  [[gnu::always_inline]] double of(std::size_t, Only) const {
+  [[gnu::always_inline]] GapLaw<double> of(std::size_t, Only) const {
     return value;
   }
 };
-struct OwnRestitution {
-  const double* value;
+struct OwnLaws {
+  const double *restitution, *reach;
   template <class V, class Only>
-  [[gnu::always_inline]] V of(std::size_t k, Only only) const {
-    return load<V>(value + k, 0, only);
+  [[gnu::always_inline]] GapLaw<V> of(std::size_t k, Only only) const {
+    return {load<V>(restitution + k, 0, only), load<V>(reach + k, 0, only)};
   }
 };
 
@@ -94,7 +100,7 @@ struct GapSearch {
 /// passing.hpp).
 template <class V, class S, class E>
 [[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const GapSearch<S>& search,
-                                                  LaneSlots slots, E restitution, const GapTarget& out,
+                                                  LaneSlots slots, const GapLaw<E>& law, const GapTarget& out,
                                                   std::size_t at) {
   const GapRule& rule = search.rule;
   Pairing<V> pair = meet(pairs, slots.i, slots.j, V{});
@@ -106,7 +112,7 @@ template <class V, class S, class E>
   const V gap = distance - pair.radius_i - pair.radius_j, v_n = dot(n, pair.v);
   const V small = pair.radius_j < pair.radius_i ? pair.radius_j : pair.radius_i;
   // Gravity moves both alike.
-  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n, restitution, rule.reach * small);
+  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n, law.restitution, law.reach * small);
   store(out.nx + at, n.x);
   store(out.ny + at, n.y);
   store(out.nz + at, n.z);
@@ -119,7 +125,7 @@ template <class V, class S, class E>
 
 template <int W, class S, class E>
 [[gnu::always_inline]] inline bool find_gaps_with(const PairView& view, const GapSearch<S>& search,
-                                                  E restitution, const GapTarget& target) {
+                                                  const E& laws, const GapTarget& target) {
   using V = Lanes<W>;
   const PairView pairs = view;  // local ones, so that no store can change them
   const GapTarget out = target;
@@ -147,13 +153,13 @@ template <int W, class S, class E>
         ask(pairs.second[next]);
       }
     }
-    far |= gap_block<V>(pairs, search, {i, j}, restitution.template of<V>(k, AllLanes{}), out, k);
+    far |= gap_block<V>(pairs, search, {i, j}, laws.template of<V>(k, AllLanes{}), out, k);
   }
   if (const std::size_t rest = pairs.count - k; rest > 0) {  // the last pair fills the lanes behind it
     for (std::size_t l = 0; l < W; ++l) slots(k + (l < rest ? l : rest - 1), l);
     double nx[W], ny[W], nz[W], bias[W];
     std::int64_t contact[W];
-    far |= gap_block<V>(pairs, search, {i, j}, restitution.template of<V>(k, FirstLanes{rest}),
+    far |= gap_block<V>(pairs, search, {i, j}, laws.template of<V>(k, FirstLanes{rest}),
                         {nx, ny, nz, bias, contact}, 0);
     for (std::size_t l = 0; l < rest; ++l) {
       out.nx[k + l] = nx[l];
@@ -170,15 +176,14 @@ template <int W, class S, class E>
 
 template <int W>
 bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& target) {
-  const auto with = [&](const auto& restitution) {
+  const auto with = [&](const auto& laws) {
     if (view.rates)
-      return find_gaps_with<W>(view, GapSearch<FlowingSpace>{{*view.cell, *view.rates}, rule}, restitution,
-                               target);
-    if (view.cell)
-      return find_gaps_with<W>(view, GapSearch<PeriodicSpace>{*view.cell, rule}, restitution, target);
-    return find_gaps_with<W>(view, GapSearch<WalledSpace>{{}, rule}, restitution, target);
+      return find_gaps_with<W>(view, GapSearch<FlowingSpace>{{*view.cell, *view.rates}, rule}, laws, target);
+    if (view.cell) return find_gaps_with<W>(view, GapSearch<PeriodicSpace>{*view.cell, rule}, laws, target);
+    return find_gaps_with<W>(view, GapSearch<WalledSpace>{{}, rule}, laws, target);
   };
-  return view.restitution ? with(OwnRestitution{view.restitution}) : with(OneRestitution{rule.restitution});
+  return view.restitution ? with(OwnLaws{view.restitution, view.reach})
+                          : with(OneLaw{{rule.restitution, rule.reach}});
 }
 
 }  // namespace
