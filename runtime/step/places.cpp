@@ -42,18 +42,28 @@ Spheres in_the_way(const Region& region, double largest, const StepState& state,
   return spheres;
 }
 
-/// Pairs of tries that overlap, in order of the first.
-std::vector<GrainPair> rivals(std::span<const Try> tries, std::span<const Seeker> seekers) {
+/// Pairs of tries that overlap, in order of the first, among those that nothing blocks: in a full region
+/// these are few, and all tries about one hole overlap one another.
+std::vector<std::pair<std::size_t, std::size_t>> rivals(std::span<const Try> tries,
+                                                        std::span<const double> blocked,
+                                                        std::span<const Seeker> seekers) {
+  std::vector<std::size_t> place;
   std::vector<Vec3> x;
   std::vector<double> radius;
-  for (const Try& one : tries) {
-    x.push_back(one.x);
-    radius.push_back(seekers[one.seeker].radius);
+  for (std::size_t t = 0; t < tries.size(); ++t) {
+    if (blocked[t] != 0) continue;
+    place.push_back(t);
+    x.push_back(tries[t].x);
+    radius.push_back(seekers[tries[t].seeker].radius);
   }
   const CellGrid grid = build_cells(x, radius);
   std::vector<std::vector<GrainPair>> pairs(1);
   find_pairs(grid, 0, grid.cells.size(), pairs.front());
-  return sort_pairs(pairs, x.size());
+  std::vector<std::pair<std::size_t, std::size_t>> found;
+  for (const GrainPair& pair : sort_pairs(pairs, x.size()))
+    found.emplace_back(place[static_cast<std::size_t>(pair.first)],
+                       place[static_cast<std::size_t>(pair.second)]);
+  return found;
 }
 
 }  // namespace
@@ -87,12 +97,12 @@ FoundPlaces find_places(const Region& region, std::span<const Seeker> seekers, c
       blocked[t] = taken_up ? 1 : 0;
     }
     ranks.max(blocked);
-    const std::vector<GrainPair> pairs = rivals(tries, seekers);
+    const auto pairs = rivals(tries, blocked, seekers);
     auto pair = pairs.begin();
     for (std::size_t t = 0; t < tries.size(); ++t) {
       const bool takes = blocked[t] == 0 && has_place[tries[t].seeker] == 0;
-      for (; pair != pairs.end() && static_cast<std::size_t>(pair->first) == t; ++pair)
-        if (takes) blocked[static_cast<std::size_t>(pair->second)] = 1;
+      for (; pair != pairs.end() && pair->first == t; ++pair)
+        if (takes) blocked[pair->second] = 1;
       if (!takes) continue;
       has_place[tries[t].seeker] = 1;
       found.push_back({tries[t].seeker, tries[t].x});
