@@ -8,6 +8,7 @@
 
 #include "io/fclib/fclib.hpp"
 #include "io/results/version.hpp"
+#include "runtime/step/cell.hpp"
 #include "runtime/step/global_solver.hpp"
 
 namespace talus {
@@ -17,6 +18,10 @@ void check_dump(const Setup& setup, int ranks) {
     if (stage.laws.largest(&PairLaw::rolling_resistance) > 0)
       throw std::invalid_argument(fmt::format(
           "--dump-fclib: stage '{}' has rolling resistance, and FCLIB has no moments", stage.name));
+  if (any_stress(setup))
+    throw std::invalid_argument(
+        "--dump-fclib: the cell follows a stress, and FCLIB has no cell that all contacts push; drive it by "
+        "strain_rates and shear_rates");
   if (!setup.clumps.empty())
     throw std::invalid_argument("--dump-fclib knows spheres only; set sample.shape to \"sphere\"");
   if (ranks > 1)

@@ -24,6 +24,16 @@ const SceneKind& kind_of(const std::string& name) {
   throw std::invalid_argument(fmt::format("there is no kind '{}': {}", name, known));
 }
 
+/// The texts of all kinds are sound, so that only the name can be wrong.
+void demand_name(const std::string& name, const std::string& text) {
+  try {
+    io::parse_scene(text, name);
+  } catch (const std::exception&) {
+    throw std::invalid_argument(
+        fmt::format("no scene can be called '{}': a name is made of letters, digits, +, - and _", name));
+  }
+}
+
 }  // namespace
 
 int new_command(const NewOptions& options) {
@@ -36,7 +46,7 @@ int new_command(const NewOptions& options) {
         "# {0}: {1}. Run it with\n#\n#     talus run {0}.toml --out out/{0}\n#\n"
         "# docs/scenes.md has every key; `talus scene-reference` prints it.\n\nname = \"{0}\"\n{2}",
         name, kind.sentence, kind.text);
-    io::parse_scene(text, path.string());  // refuses a name that no scene may have
+    demand_name(name, text);
     io::check_output_files({}, {path}, options.force);
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());

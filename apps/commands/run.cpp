@@ -131,12 +131,16 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
   }
 }
 
+void print_warnings(const Terminal& terminal, const Prepared& run) {
+  for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);
+}
+
 /// What is to be said of the sample.
 void speak_of_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
   run.wall_mass = io::automatic_wall_mass(run.sample);
   run.warnings = scene_warnings(run.scene, run.sample);
-  for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);
   if (!options.dry_run) return;
+  print_warnings(terminal, run);
   print_out("{}", io::resolved_scene(run.scene));
   print_error("talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n", options.scene,
               contents(run.scene, run.sample.size()));
@@ -261,7 +265,10 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
     const std::size_t grains =
         run.point ? static_cast<std::size_t>(run.point->file.state.head.size.bodies) : run.sample.size();
     print_start(terminal, scene, grains, provenance.threads, ranks);
-    if (run.point) print_resumption(terminal, *run.point);
+    if (run.point)
+      print_resumption(terminal, *run.point);
+    else
+      print_warnings(terminal, run);
   }
   const PreparedRun prepared{options,      scene,         run.recordings,
                              ranks,        terminal,      run.point ? &*run.point : nullptr,

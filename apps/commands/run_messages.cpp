@@ -129,13 +129,15 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
   for (const InsertReport& insert : simulation.inserted()) {
     terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
                  counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
-    if (insert.no_room > 0)
+    if (insert.waiting > 0)
       terminal.warn(
           "warning: insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "
-          "inserted.csv "
-          "says when. Enlarge its region, raise its velocity or attempts, or ask for fewer",
+          "inserted.csv says when. Enlarge its region, raise its velocity, or ask for fewer",
           insert.name, counted(static_cast<std::size_t>(insert.no_room), "step"),
           counted(static_cast<std::size_t>(insert.waiting), "grain"));
+    else if (insert.no_room > 0)
+      terminal.say("insert '{}' had no room for a grain in {}; all that were due have come", insert.name,
+                   counted(static_cast<std::size_t>(insert.no_room), "step"));
   }
   for (const RemoveReport& remove : simulation.removed())
     terminal.say("remove '{}': {}{}, {:.6g} kg", remove.name,
@@ -198,10 +200,14 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
 }
 
 /// Overlaps are a matter of the time step alone.
-std::string remedy_of_misses(const io::Summary& summary) {
-  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
+std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& solver) {
+  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps,
+             sweeps_done = summary.worst_error_rms <= solver.tolerance;
   return fmt::format(
-      "{}{}", overlaps_alone ? "Reduce time_step" : "Raise solver.max_iterations, reduce time_step",
+      "{}{}",
+      overlaps_alone ? "Reduce time_step"
+      : sweeps_done  ? "More sweeps would not help, every error_rms is within its tolerance: reduce time_step"
+                     : "Raise solver.max_iterations, reduce time_step",
       summary.exit_code == exit_tolerance_missed ? ", or accept them with allow_unconverged = true" : "");
 }
 
@@ -226,7 +232,7 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         "which. {}",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
         summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance,
-        remedy_of_misses(summary));
+        remedy_of_misses(summary, solver));
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "

@@ -126,8 +126,8 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
   }
   if (refused.empty()) return;
   throw std::invalid_argument(fmt::format(
-      "the checkpoint {} is of another scene: {}. Ends and loads of stages, loads of walls, output and "
-      "checkpoints may change; for anything else begin a run in another directory, from this state if you "
+      "the checkpoint {} is of another scene: {}. Ends of stages, loads of walls, output and "
+      "checkpoints may change; for anything else, stresses of a cell among it, begin a run in another directory, from this state if you "
       "like ([sample] kind = \"state\")",
       point.path.string(), fmt::join(refused, "; ")));
 }

@@ -135,12 +135,11 @@ int solve(const SolveOptions& options, const Plan& plan) {
     }
     for (const DelassusMethod method : plan.methods) {
       Solved solved = solve_one(problem.contact, file.name, method, plan, options, [&] {
-        if (plan.table)
-          patience.tell([&] {
-            return fmt::format("solve {} of {}: {}, {} contacts, {}", rows.size() + 1,
-                               plan.files.size() * plan.methods.size(), file.name, problem.contact.contacts(),
-                               name_of(method));
-          });
+        patience.tell([&] {
+          return fmt::format("solve {} of {}: {}, {} contacts, {}, for {:g} s at most", rows.size() + 1,
+                             plan.files.size() * plan.methods.size(), file.name, problem.contact.contacts(),
+                             name_of(method), options.max_seconds);
+        });
       });
       if (!plan.table) print_line(solved.row);
       if (!options.out.empty())

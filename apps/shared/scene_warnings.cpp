@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <set>
 
 #include "apps/shared/sample_builder.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -20,8 +22,10 @@ constexpr double lightest = 30, heaviest = 23000;
 void add_density(const std::string& where, double density, std::vector<std::string>& warnings) {
   if (density < lightest)
     warnings.push_back(
-        fmt::format("{} has a density of {:g} kg/m^3, less than foam; {:g} g/cm^3 are {:g} kg/m^3", where,
-                    density, density, 1000 * density));
+        fmt::format("{} has a density of {:g} kg/m^3, less than foam{}", where, density,
+                    1000 * density < lightest || 1000 * density > heaviest
+                        ? ""
+                        : fmt::format("; {:g} g/cm^3 are {:g} kg/m^3", density, 1000 * density)));
   if (density > heaviest)
     warnings.push_back(fmt::format("{} has a density of {:g} kg/m^3, more than any element", where, density));
 }
@@ -85,6 +89,68 @@ void add_segregation(const io::Scene& scene, const Sample& sample, std::vector<s
                     low, high));
 }
 
+/// Nothing rolls without friction. Pairs of materials that no grain has never meet.
+void add_idle_rolling(const io::Scene& scene, const Sample& sample, std::vector<std::string>& warnings) {
+  std::set<Material> of_grains(sample.material.begin(), sample.material.end());
+  if (sample.material.empty() && sample.size() > 0) of_grains.insert(material_of_grains);
+  for (const InsertRule& rule : scene.setup.inserts) of_grains.insert(rule.material);
+  const std::vector<std::string>& names = scene.setup.material_names;
+  const auto name = [&](Material m) -> std::string {
+    if (!names.empty()) return "'" + names.at(m) + "'";
+    return m == material_of_grains ? "grains" : "walls";
+  };
+  for (const Stage& stage : scene.setup.stages)
+    for (Material b = 0; stage.laws.knows(b); ++b)
+      for (Material a = 0; a <= b; ++a) {
+        const PairLaw& law = stage.laws.between(a, b);
+        if (law.rolling_resistance == 0 || law.friction > 0 ||
+            !(of_grains.contains(a) || of_grains.contains(b)))
+          continue;
+        warnings.push_back(fmt::format(
+            "rolling_resistance of {} and {} does nothing in stage '{}': they have no friction, and "
+            "nothing rolls without it",
+            name(a), name(b), stage.name));
+      }
+}
+
+/// Row of a table of displacements at which grains that rebound feel two weaker impacts in place of one: its
+/// velocity jumps there, and not in the middle of a step, from where on walls move until the next middle. The
+/// second impact finds them on their way already, however short the steps are. 0: there is none.
+std::size_t split_jump(const MotionTable& table, double h) {
+  constexpr double part = 0.1, near = 0.01, apart = 4;  // of the fastest velocity; of a step; steps
+  if (!table.velocity.empty() || table.shift.empty()) return 0;
+  const auto velocity = [&](std::size_t k) {
+    return Vec3((table.shift[k + 1] - table.shift[k]) / (table.t[k + 1] - table.t[k]));
+  };
+  double fastest = 0;
+  for (std::size_t k = 0; k + 1 < table.t.size(); ++k) fastest = std::max(fastest, velocity(k).norm());
+  for (std::size_t k = 1; k + 1 < table.t.size(); ++k) {
+    if (std::min(table.t[k] - table.t[k - 1], table.t[k + 1] - table.t[k]) < apart * h) continue;
+    const double phase = table.t[k] / h - 0.5;
+    if ((velocity(k) - velocity(k - 1)).norm() > part * fastest && std::abs(phase - std::round(phase)) > near)
+      return k;
+  }
+  return 0;
+}
+
+void add_jumps(const io::Scene& scene, std::vector<std::string>& warnings) {
+  const auto rebounds = [](const Stage& of) {
+    return of.time_step > 0 && of.laws.largest(&PairLaw::restitution) > 0;
+  };
+  const auto stage = std::ranges::find_if(scene.setup.stages, rebounds);
+  if (stage == scene.setup.stages.end()) return;
+  for (const Wall& wall : scene.setup.walls)
+    for (const MotionPart& part : wall.motion)
+      if (const std::size_t row = part.table ? split_jump(*part.table, stage->time_step) : 0; row > 0)
+        warnings.push_back(fmt::format(
+            "the velocity of wall '{}' jumps at {:g} s of {}, which is not the middle of a step: grains "
+            "rebound "
+            "from it as from two weaker impacts, however short the steps are. Give the row the time {:g} s, "
+            "or "
+            "let a motion of one velocity begin there with a stage",
+            wall.name, part.table->t[row], part.file, part.table->t[row] + 0.5 * stage->time_step));
+}
+
 }  // namespace
 
 std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sample) {
@@ -94,6 +160,12 @@ std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sa
   add_gravity(scene, warnings);
   add_regions(scene, warnings);
   add_segregation(scene, sample, warnings);
+  add_idle_rolling(scene, sample, warnings);
+  add_jumps(scene, warnings);
+  if (const auto parts = static_cast<std::size_t>(scene.setup.decomposition.subdomains);
+      parts > std::max<std::size_t>(1, sample.size()) && scene.setup.inserts.empty())
+    warnings.push_back(fmt::format("{} subdomains for {} grains: most of them hold none; fewer are faster",
+                                   parts, sample.size()));
   if (scene.materials.empty()) add_density("the material", scene.density, warnings);
   for (const io::MaterialSpec& material : scene.materials)
     add_density(fmt::format("material '{}'", material.name), material.density, warnings);

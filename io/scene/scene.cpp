@@ -220,7 +220,7 @@ class SceneReader {
           fail_at(*table, path + ".name", fmt::format("another stage is named '{}' already", stage.name));
       if (stage.chooses_time_step && stage.time_step_max == 0 && stage.gravity.norm() == 0)
         fail_at(*table, path + ".time_step_max",
-                "missing; without gravity time_step = \"auto\" has nothing to find it by");
+                "missing: the longest step [s] that \"auto\" may take, which finds none without gravity");
       if (stage.time_step == 0 && !stage.chooses_time_step)
         fail_at(*table, path + ".time_step", "missing; expected: real [s], here or at the top of the scene");
       read_loads(*table, path, stage, in_force);
@@ -343,8 +343,12 @@ class SceneReader {
     if (end.shear_strain && !flows && !ends_else && !end.strain)
       fail_at(*node, end_path + ".shear_strain",
               "the cell has no rates and no stress in this stage: it would never end");
-    if (end.strain && !flows && !ends_else && stands_still(scene_.setup.walls, in_force))
-      fail_at(*node, end_path + ".strain", "no wall moves or is pushed in this stage: it would never end");
+    const bool of_cell = scene_.setup.domain.edges()[end.strain_axis] > 0;
+    if (end.strain && !ends_else &&
+        (of_cell ? !stage.strains(end.strain_axis) : !flows && stands_still(scene_.setup.walls, in_force)))
+      fail_at(*node, end_path + ".strain",
+              of_cell ? "the cell is not strained along that axis in this stage: it would never end"
+                      : "no wall moves or is pushed in this stage: it would never end");
     if (end.steady && !end.steady_time && !flows)
       fail_at(
           *node, end_path + ".steady",
@@ -353,7 +357,7 @@ class SceneReader {
       return (load.drive == WallDrive::pressure && load.pressure > 0) ||
              (load.drive == WallDrive::force && load.force > 0);
     });
-    if (end.equilibrium && !pushed && !stage.stress.any() && stage.gravity.norm() == 0)
+    if (end.equilibrium && !pushed && !stage.stress.presses() && stage.gravity.norm() == 0)
       fail_at(*node, end_path + ".equilibrium",
               "neither gravity, a pushed wall nor the stress of a cell loads the sample in this stage");
   }

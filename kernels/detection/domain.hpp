@@ -7,6 +7,7 @@
 
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/separation.hpp"
+#include "kernels/shapes/surface.hpp"
 #include "kernels/shapes/walls.hpp"
 
 namespace talus {
@@ -82,6 +83,11 @@ struct Domain {
   /// within `margin` [m] of it along every axis, or within an edge where that is less; k = 0 is one of them.
   template <class Visit>
   void each_image(const Vec3& x, double margin, const Visit& visit) const;
+
+  /// Likewise for each image of any x between the planes of `box` along the axes that repeat; the others do
+  /// not count.
+  template <class Visit>
+  void each_image_in(const Bounds& box, const Vec3& x, const Visit& visit) const;
 };
 
 /// A cell with the edges `lengths` [m], 0 along an axis of walls, and the shears (xy, xz, yz) [m] of
@@ -92,12 +98,16 @@ Domain periodic_domain(const Vec3& lengths, const Vec3& low = Vec3::Zero(),
 
 template <class Visit>
 void Domain::each_image(const Vec3& x, double margin, const Visit& visit) const {
+  const Vec3 most = edges().cwiseMin(margin);
+  each_image_in({low - most, low + edges() + most}, x, visit);
+}
+
+template <class Visit>
+void Domain::each_image_in(const Bounds& box, const Vec3& x, const Visit& visit) const {
   // Numbers of images along an axis, with the coordinate of the one at hand.
   const auto along = [&](Eigen::Index axis, double at, double edge, const auto& each) {
     if (edge == 0) return each(0.0);
-    const double most = std::min(margin, edge);
-    const double from = low[axis] - most - at, to = low[axis] + edge + most - at;
-    for (double k = std::ceil(from / edge); k <= to / edge; ++k) each(k);
+    for (double k = std::ceil((box.low[axis] - at) / edge); k <= (box.high[axis] - at) / edge; ++k) each(k);
   };
   along(2, x[2], cell.zz, [&](double c) {
     const Vec3 up = x + c * Vec3(cell.xz, cell.yz, cell.zz);

@@ -74,10 +74,49 @@ void validate_stress(const Setup& setup, const Stage& stage) {
       refuse(fmt::format("amplitude_{0} swings about {0}, which is not given", names[k]));
   }
   if (swings && !(load.period > 0)) refuse("swings need a period > 0 [s]");
+  const double step = stage.chooses_time_step ? stage.time_step_max : stage.time_step;
+  constexpr double steps = 4;  // in which a swing still has its amplitude
+  if (swings && load.period < steps * step)
+    refuse(
+        fmt::format("swings of a period of {} s are not seen in steps of {} s; make time_step a quarter "
+                    "of the period at most",
+                    load.period, step));
   if (!(load.ramp_time >= 0 && std::isfinite(load.ramp_time))) refuse("ramp_time must be a number >= 0 [s]");
 }
 
+/// "" or what is wrong with the size of a part of space, where all images in it count.
+std::string too_wide(const Domain& domain, const Bounds& box) {
+  constexpr double most = 16;  // edges
+  const Vec3 edges = domain.edges();
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (edges[axis] > 0 && !(box.high[axis] - box.low[axis] <= most * edges[axis]))
+      return fmt::format("is more than {} edges of the cell long along {}; all images in it count", most,
+                         "xyz"[axis]);
+  return "";
+}
+
 }  // namespace
+
+std::string fault_in_cell(const Setup& setup, const Region& region) {
+  if (!setup.domain.repeats) return "";
+  const Vec3 edges = setup.domain.edges();
+  if (region.kind != Region::Kind::beyond && !region.is_surface())
+    return too_wide(setup.domain, bounds_of(region));
+  if (region.kind == Region::Kind::beyond) {
+    for (const Eigen::Index axis : {0, 1, 2})
+      if (edges[axis] > 0 && region.normal[axis] != 0)
+        return fmt::format(
+            "is all beyond a plane across {}, where the cell repeats: every grain has an image "
+            "there; give a box",
+            "xyz"[axis]);
+    return "";
+  }
+  const bool moves = any_stress(setup) || std::ranges::any_of(setup.stages, &Stage::flows);
+  if (moves) return "is a surface, and the edges of the cell move: what goes through it is not counted there";
+  if (region.kind == Region::Kind::plane && (region.normal.array() != 0).count() > 1)
+    return "is a plane; in a cell its normal has to lie along x, y or z";
+  return region.kind == Region::Kind::disc ? too_wide(setup.domain, bounds_of(region)) : "";
+}
 
 bool bounded(const Setup& setup, Eigen::Index axis) {
   const auto faces = [&](double direction) {
@@ -114,8 +153,13 @@ void validate_cell(const Setup& setup) {
   }
   if (!setup.inserts.empty() || !setup.removes.empty())
     refuse("grains cannot come or go in a periodic cell; remove [[insert]] and [[remove]]");
-  if (!setup.probes.empty() || !setup.fields.empty())
-    refuse("regions and grids know no images; remove [[probe]] and [[field]] (cell.csv has means)");
+  for (const ProbeRule& probe : setup.probes)
+    if (const std::string fault = fault_in_cell(setup, probe.region); !fault.empty())
+      refuse(fmt::format("probe '{}' {}", probe.name, fault));
+  for (const FieldRule& field : setup.fields)
+    if (const std::string fault = fault_in_cell(setup, {.low = field.low, .high = field.high});
+        !fault.empty())
+      refuse(fmt::format("field '{}' {}", field.name, fault));
 }
 
 void validate_coupling(const Setup& setup) {

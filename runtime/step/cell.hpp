@@ -8,8 +8,12 @@
 namespace talus {
 
 /// Throws std::invalid_argument, naming it, for whatever a cell has no room for: walls across an axis that
-/// repeats, walls that are no planes or that turn, and grains that come or go.
+/// repeats, walls that are no planes or that turn, grains that come or go, and what fault_in_cell finds.
 void validate_cell(const Setup& setup);
+
+/// What is wrong with a part of space that is looked at, in the cell with all images; "" if nothing, and
+/// between walls.
+std::string fault_in_cell(const Setup& setup, const Region& region);
 
 /// Something stands at both ends of an axis: walls, or the images of the cell.
 bool bounded(const Setup& setup, Eigen::Index axis);

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -118,7 +119,7 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.kinetic_stress = symmetric(kinetic);
   out.p = contact.trace() / 3;
   out.q = std::sqrt(1.5) * deviator(contact).norm();
-  out.q_over_p = stress_ratio(contact);
+  out.q_over_p = out.q == 0 ? 0 : out.q / out.p;
   out.solid_fraction = report.solid_fraction;
   out.contacts_a_grain = 2 * static_cast<double>(report.active) /
                          static_cast<double>(std::max<std::int64_t>(1, outcome.sample.bodies));
@@ -129,7 +130,10 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.a_t = along_stress(fabric.of_tangential_forces, deviator(contact));
   out.fabric_q_over_p = stress_ratio_of(fabric, deviator(contact));
   out.coordination = coordination(state, ranks, contacts_to_hold(outcome.parameters));
-  out.inertial_number = shear_rate(gradient) * inertial_time(outcome.sample, out.p);
+  // Of a flow that nothing presses together it is infinite.
+  const double rate = shear_rate(gradient);
+  out.inertial_number = rate > 0 && out.p <= 0 ? std::numeric_limits<double>::infinity()
+                                               : rate * inertial_time(outcome.sample, out.p);
   out.converged = report.converged;
   return out;
 }

@@ -16,8 +16,17 @@ Grid grid_of(const FieldRule& rule) {
   return grid;
 }
 
+/// All that is no further from the grid than `reach` [m] along every axis.
+Bounds around(const Grid& grid, const Vec3& reach) {
+  const auto& [x, y, z] = grid.cells;
+  const Vec3 cells(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
+  return {grid.low - reach, grid.low + grid.spacing.cwiseProduct(cells) + reach};
+}
+
 void spread_bodies(const StepState& state, SlotRange range, const Grid& grid, const Lucy& lucy,
                    GridSums& sums) {
+  const Domain& domain = state.domain;
+  const Bounds near = around(grid, Vec3::Constant(lucy.cutoff()));
   const Bodies& bodies = state.bodies;
   const ClumpView clumps = clumps_of(state);
   for (std::size_t s = range.begin; s < range.end; ++s) {
@@ -26,7 +35,10 @@ void spread_bodies(const StepState& state, SlotRange range, const Grid& grid, co
     const double radius = bodies.radius[s];
     const double volume =
         clumps.is_clump(s) ? clumps.of(s).volume * radius * radius * radius : sphere_mass(radius, 1);
-    add_grain(grid, lucy, {bodies.x[s], Vec3(v.u), v.inv_mass > 0 ? 1 / v.inv_mass : 0, volume}, sums);
+    const double mass = v.inv_mass > 0 ? 1 / v.inv_mass : 0;
+    domain.each_image_in(near, bodies.x[s], [&](const Vec3& edges, const Vec3& x) {
+      add_grain(grid, lucy, {x, Vec3(v.u) + Domain::times(domain.rates, edges), mass, volume}, sums);
+    });
   }
 }
 
@@ -41,9 +53,13 @@ void spread_contacts(const StepState& state, SubdomainPlace e, double impulse_ti
     for (std::size_t k = begin; k < begin + static_cast<std::size_t>(state.contacts.count[c]); ++k) {
       const Vec3 impulse = contact_impulse(state.contacts, k);
       if (impulse == Vec3::Zero()) continue;
-      const Vec3& from = poses.x[static_cast<std::size_t>(state.contacts.first[k])];
+      const Vec3& first = poses.x[static_cast<std::size_t>(state.contacts.first[k])];
       const Vec3 branch = branch_of(poses, state.contacts, k, wall);
-      add_contact(grid, lucy, {from, from - branch, impulse / impulse_time * branch.transpose()}, sums);
+      const Bounds near = around(grid, branch.cwiseAbs() + Vec3::Constant(lucy.cutoff()));
+      const Mat3 moment = impulse / impulse_time * branch.transpose();
+      state.domain.each_image_in(near, first, [&](const Vec3&, const Vec3& from) {
+        add_contact(grid, lucy, {from, from - branch, moment}, sums);
+      });
     }
   }
 }

@@ -1,12 +1,39 @@
 #include "runtime/step/passages.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
 #include "kernels/shapes/region_parts.hpp"
 
 namespace talus {
+
+namespace {
+
+/// How often, less the ways back, a body or an image of it went through a disc or plane. In a cell whose
+/// edges stand, and with a plane across an axis (fault_in_cell).
+int passage_in(const Domain& domain, const Region& surface, const Vec3& from, const Vec3& to) {
+  if (!domain.repeats) return passage(surface, from, to);
+  const Vec3 way = domain.separation(to, from);
+  int sum = 0;
+  const auto add = [&](const Vec3& x) { sum += passage(surface, x - way, x); };
+  if (surface.kind == Region::Kind::disc) {
+    const Bounds box = bounds_of(surface);
+    domain.each_image_in({box.low - way.cwiseAbs(), box.high + way.cwiseAbs()}, to,
+                         [&](const Vec3&, const Vec3& x) { add(x); });
+    return sum;
+  }
+  Eigen::Index axis = 0;
+  surface.normal.cwiseAbs().maxCoeff(&axis);
+  const double edge = domain.edges()[axis];
+  if (edge == 0) return passage(surface, from, to);
+  const double nearest = std::nearbyint((surface.point - to)[axis] / edge);
+  for (const double k : {nearest - 1, nearest, nearest + 1}) add(to + k * edge * Vec3::Unit(axis));
+  return sum;
+}
+
+}  // namespace
 
 void Passages::begin_step(const StepState& state) {
   const Bodies& bodies = state.bodies;
@@ -58,7 +85,8 @@ std::vector<Passage> Passages::end_step(std::span<const ProbeRule> probes, const
     if (!counts(state.decomposition, s)) continue;
     const Vec3 before(before_[place++].x);
     for (std::size_t p = 0; p < probes.size(); ++p) {
-      const int way = probes[p].region.is_surface() ? passage(probes[p].region, before, bodies.x[s]) : 0;
+      const int way =
+          probes[p].region.is_surface() ? passage_in(state.domain, probes[p].region, before, bodies.x[s]) : 0;
       if (way == 0) continue;
       const double inverse = whole_velocity(state.decomposition, bodies, s).inv_mass;
       passages.push_back({static_cast<std::int64_t>(p), static_cast<std::int64_t>(bodies.id[s]),

@@ -52,22 +52,35 @@ void add(const double* numbers, RegionSums& to) {
   }
 }
 
+/// Calls visit(k, image) for the images of x that lie no further than `reach` [m] along every axis from the
+/// box around the region. A half space bounds an axis of walls: nearer images are as deep in it.
+template <class Visit>
+void each_image_near(const Region& region, const Domain& domain, const Vec3& x, const Vec3& reach,
+                     const Visit& visit) {
+  if (!domain.repeats || region.kind == Region::Kind::beyond) return visit(Vec3(Vec3::Zero()), x);
+  const Bounds box = bounds_of(region);
+  domain.each_image_in({box.low - reach, box.high + reach}, x, visit);
+}
+
 void add_body(const StepState& state, std::size_t s, const Region& region, RegionSums& to) {
   const Bodies& bodies = state.bodies;
-  const Vec3& x = bodies.x[s];
   const ClumpView clumps = clumps_of(state);
-  const bool in = contains(region, x);
-  if (!clumps.is_clump(s))
-    to.volume += sphere_part(region, x, bodies.radius[s]);
-  else if (in)
-    to.volume += clumps.of(s).volume * bodies.radius[s] * bodies.radius[s] * bodies.radius[s];
-  if (!in) return;
+  const double radius = bodies.radius[s];
   const Velocity v = whole_velocity(state.decomposition, bodies, s);
   const double mass = v.inv_mass > 0 ? 1 / v.inv_mass : 0;
-  to.motion.add(mass, Vec3(v.u));
-  const std::size_t material = bodies.material.empty() ? 0 : bodies.material[s];
-  ++to.counts[material];
-  to.masses[material] += mass;
+  each_image_near(region, state.domain, bodies.x[s], Vec3::Constant(radius),
+                  [&](const Vec3& edges, const Vec3& x) {
+                    const bool in = contains(region, x);
+                    if (!clumps.is_clump(s))
+                      to.volume += sphere_part(region, x, radius);
+                    else if (in)
+                      to.volume += clumps.of(s).volume * radius * radius * radius;
+                    if (!in) return;
+                    to.motion.add(mass, Vec3(v.u) + Domain::times(state.domain.rates, edges));
+                    const std::size_t material = bodies.material.empty() ? 0 : bodies.material[s];
+                    ++to.counts[material];
+                    to.masses[material] += mass;
+                  });
 }
 
 void add_contact(const StepState& state, const Poses& poses, std::size_t k, const Wall* wall,
@@ -75,15 +88,16 @@ void add_contact(const StepState& state, const Poses& poses, std::size_t k, cons
   const Vec3 impulse = contact_impulse(state.contacts, k);
   const bool active = is_active(state.contacts, k);
   if (!active && impulse == Vec3::Zero()) return;
-  const Vec3& first = poses.x[static_cast<std::size_t>(state.contacts.first[k])];
+  const Vec3& x = poses.x[static_cast<std::size_t>(state.contacts.first[k])];
   const Vec3 branch = branch_of(poses, state.contacts, k, wall);
-  for (std::size_t p = 0; p < regions.size(); ++p) {
-    if (active)
-      to[p].ends += (contains(regions[p], first) ? 1 : 0) +
-                    (wall == nullptr && contains(regions[p], first - branch) ? 1 : 0);
-    if (const double part = way_part(regions[p], first, first - branch); part > 0)
-      to[p].moment += part * impulse * branch.transpose();
-  }
+  for (std::size_t p = 0; p < regions.size(); ++p)
+    each_image_near(regions[p], state.domain, x, branch.cwiseAbs(), [&](const Vec3&, const Vec3& first) {
+      if (active)
+        to[p].ends += (contains(regions[p], first) ? 1 : 0) +
+                      (wall == nullptr && contains(regions[p], first - branch) ? 1 : 0);
+      if (const double part = way_part(regions[p], first, first - branch); part > 0)
+        to[p].moment += part * impulse * branch.transpose();
+    });
 }
 
 }  // namespace

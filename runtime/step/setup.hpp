@@ -77,6 +77,10 @@ struct StressLoad {
   bool any() const {
     return std::ranges::any_of(to, [](const auto& component) { return component.has_value(); });
   }
+  /// Some component aims at more than 0.
+  bool presses() const {
+    return std::ranges::any_of(to, [](const auto& component) { return component.value_or(0) != 0; });
+  }
 };
 
 /// One stage: a time interval with its own loads.
@@ -90,6 +94,10 @@ struct Stage {
   Vec3 strain_rates = Vec3::Zero();  ///< of the periodic cell: dv_x/dx, dv_y/dy, dv_z/dz [1/s]
   Vec3 shear_rates = Vec3::Zero();   ///< dv_x/dy, dv_x/dz, dv_y/dz [1/s]
   StressLoad stress;                 ///< of the periodic cell
+  /// The cell may change along an axis.
+  bool strains(int axis) const {
+    return strain_rates[axis] != 0 || stress.to[static_cast<std::size_t>(axis)].has_value();
+  }
   bool flows() const { return !strain_rates.isZero(0) || !shear_rates.isZero(0) || stress.any(); }
   PairTable laws;                                       ///< of the setup's materials
   std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins

@@ -83,7 +83,7 @@ const StepReport& Simulation::step() {
   check_for_runaway(outcome, energy_free);
   const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
-  add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
+  add_step(impl_->report, outcome, overlap, graph::seconds_now() - start, impl_->ranks);
   impl_->named_reports = impl_->named.end_step(named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
   impl_->probe();

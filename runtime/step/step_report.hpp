@@ -35,8 +35,9 @@ struct StepOutcome {
   const IterationResult& result;
 };
 
-/// Updates the report of the step before to this step. `elapsed`: time that the step took [s].
-void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverlap& overlap, double elapsed);
+/// Updates the report of the step before to this step. `elapsed`: time that the step took [s]. Collective.
+void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverlap& overlap, double elapsed,
+              const graph::Communicator& ranks);
 
 /// Stresses and strains of the box that the walls close, after the step of `report`; none if they close none.
 /// `strain`: of its lengths, since the stage began [1]. Collective.

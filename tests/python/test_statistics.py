@@ -1,5 +1,7 @@
 """Statistics against closed forms."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,20 @@ def test_pairs_are_those_of_brute_force(r_max, periodic):
     counts = np.histogram(distance[distance > 0], np.linspace(0, r_max, 6))[0]
     shells = 4 / 3 * np.pi * np.diff(np.linspace(0, r_max, 6) ** 3)
     assert np.allclose(g * len(distance) * shells * 300 / size.prod(), counts)
+
+
+def test_pairs_of_a_leaning_cell_are_those_of_all_images():
+    size, (xy, xz, yz), r_max = np.array([1, 1.1, 1.3]), (0.4, -0.5, 0.3), 0.4
+    edges = np.array([[size[0], xy, xz], [0, size[1], yz], [0, 0, size[2]]])
+    x = np.random.default_rng(6).random((200, 3)) * size
+    images = np.array(list(itertools.product([-2, -1, 0, 1, 2], repeat=3))) @ edges.T
+    distance = np.linalg.norm(x[:, None, None] - x[None, :, None] - images, axis=-1).ravel()
+    _, g = talus.pair_correlation(x, [0] * 3, size, r_max, bins=5, periodic=[True] * 3, shears=(xy, xz, yz))
+    counts = np.histogram(distance[distance > 0], np.linspace(0, r_max, 6))[0]
+    shells = 4 / 3 * np.pi * np.diff(np.linspace(0, r_max, 6) ** 3)
+    assert counts.sum() > 1000 and np.allclose(g * 200 * shells * 200 / size.prod(), counts)
+    with pytest.raises(ValueError, match="have to be periodic"):
+        talus.pair_correlation(x, [0] * 3, size, 0.1, periodic=(True, True, False), shears=(0, 0.1, 0))
 
 
 def test_more_than_half_of_the_box_is_refused():

@@ -53,6 +53,31 @@ TEST_F(Warnings, OfADensityInOtherUnits) {
                 .find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
             std::string::npos);
   EXPECT_NE(of(replaced(column_scene, "2600", "2.6e6")).find("more than any element"), std::string::npos);
+  EXPECT_EQ(of(replaced(column_scene, "2600", "1e-3")).find("g/cm^3"), std::string::npos)
+      << "0.001 is no unit";
+}
+
+TEST_F(Warnings, OfRollingResistanceWithoutFriction) {
+  EXPECT_NE(of(replaced(column_scene, "friction = 0.35",
+                        "friction = 0.35\nwall_friction = 0\nrolling_resistance = 0.1"))
+                .find("rolling_resistance of grains and walls does nothing in stage"),
+            std::string::npos);
+}
+
+TEST_F(Warnings, OfATableThatJumpsOffTheMiddleOfAStep) {
+  write(at("stroke.csv"), "t,x,y,z\n0,0,0,0\n0.05,0,0,0\n1,0,0,0.95\n");
+  const std::string scene =
+      replaced(replaced(column_scene, "friction = 0.35", "restitution = 0.5"), "side = \"z-\"",
+               "side = \"z-\"\nmotion = [{ kind = \"table\", file = \"stroke.csv\" }]");
+  EXPECT_NE(of(scene).find("'floor' jumps at 0.05 s of stroke.csv"), std::string::npos) << of(scene);
+  EXPECT_NE(of(scene).find("the time 0.0505 s"), std::string::npos);
+  write(at("stroke.csv"), "t,x,y,z\n0,0,0,0\n0.0505,0,0,0\n1,0,0,0.95\n");
+  EXPECT_EQ(of(scene), "");
+}
+
+TEST_F(Warnings, OfMoreSubdomainsThanGrains) {
+  EXPECT_NE(of(column_scene + "\n[decomposition]\nsubdomains = 500\n").find("500 subdomains for"),
+            std::string::npos);
 }
 
 TEST_F(Warnings, AreInTheSummaryOfTheRun) {

@@ -25,7 +25,9 @@ def fabric_tensor(normals: ArrayLike) -> np.ndarray:
 def anisotropy(fabric: ArrayLike) -> float:
     """Anisotropy of a fabric tensor, a = 5 sqrt(3/2 D:D) with its deviator D = F - I/3 tr F; 0 without direction.
 
-    Where normals are distributed about an axis as (1 + a (3 cos² - 1)/2)/4π over the sphere, |a| comes out.
+    Where normals are distributed about an axis as (1 + a (3 cos² - 1)/2)/4π over the sphere, |a| comes out. The `a_c` of
+    cell.csv is defined otherwise (docs/theory.md): along the deviator of the stress, and 1.5 times this one where both
+    have the same axes.
     """
     f = np.asarray(fabric, dtype=float)
     deviator = f - np.eye(3) * np.trace(f) / 3
@@ -56,26 +58,37 @@ def pair_correlation(
     r_max: float,
     bins: int = 100,
     periodic: ArrayLike = (False, False, False),
+    shears: ArrayLike = (0, 0, 0),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pair correlation g(r) up to r_max: density of centres at a distance r from a centre, over the mean density.
 
     positions: centres [m], shape (n, 3). low, high: corners of the box that holds them [m]; a box of periodic directions
-    is the cell. In the others only grains farther than r_max from both faces are counted from, so that every shell is
+    is the brick of the cell, whose edges may lean by `shears` (xy, xz, yz) [m]. In the others only grains farther than r_max from both faces are counted from, so that every shell is
     whole; the mean density is that of the box. bins: shells of equal thickness.
     Returns the mean radius of each shell [m] and g [1]; time and memory grow as n times the neighbours within r_max.
 
-    Raises ValueError where r_max is no distance of this box: more than half of it.
+    Raises ValueError where r_max is no distance of this box: more than half of it between two of its faces; and for
+    shears between directions that are not both periodic.
     """
     x, low, high = np.asarray(positions, float).reshape(-1, 3), np.asarray(low, float), np.asarray(high, float)
     size, wraps = high - low, np.broadcast_to(np.asarray(periodic, bool), 3)
-    if not 0 < r_max <= 0.5 * size.min():
-        raise ValueError(f"r_max = {r_max} m: must be above 0 and at most half of the box, {0.5 * size.min()} m")
+    edges_of_cell, pairs = np.diag(size), ((0, 1), (0, 2), (1, 2))
+    for (i, j), shear in zip(pairs, np.asarray(shears, float)):
+        edges_of_cell[i, j] = shear
+        if shear != 0 and not (wraps[i] and wraps[j]):
+            raise ValueError("shears: both directions of one that is not 0 have to be periodic")
+    widths = 1 / np.linalg.norm(np.linalg.inv(edges_of_cell), axis=1)  # between opposite faces
+    if not 0 < r_max <= 0.5 * widths.min():
+        raise ValueError(f"r_max = {r_max} m: must be above 0 and at most half of the box, {0.5 * widths.min()} m")
     inner = np.all(wraps | ((x >= low + r_max) & (x <= high - r_max)), axis=1)
     edges = np.linspace(0, r_max, bins + 1)
     counts = np.zeros(bins)
-    for first, second in _near_pairs(x - low, size, wraps, r_max, np.flatnonzero(inner)):
+    parts = np.linalg.solve(edges_of_cell, (x - low).T).T
+    parts = np.where(wraps, parts - np.floor(parts), parts)
+    for first, second in _near_pairs(parts, widths, wraps, r_max, np.flatnonzero(inner)):
         d = x[second] - x[first]
-        d -= np.where(wraps, size * np.round(d / size), 0)
+        for axis in np.flatnonzero(wraps)[::-1]:
+            d -= np.round(d[:, axis, None] / size[axis]) * edges_of_cell[:, axis]
         counts += np.histogram(np.sqrt(np.einsum("ij,ij->i", d, d)), edges)[0]
     shells = 4 / 3 * np.pi * np.diff(edges**3)
     density = len(x) / size.prod()
@@ -84,11 +97,14 @@ def pair_correlation(
 
 
 def _near_pairs(
-    x: np.ndarray, size: np.ndarray, wraps: np.ndarray, reach: float, origins: np.ndarray
+    parts: np.ndarray, widths: np.ndarray, wraps: np.ndarray, reach: float, origins: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pairs (origin, other) within 3 x 3 x 3 cells at least as wide as `reach`; each pair once for its origin."""
-    cells = np.maximum((size / reach).astype(int), 1)
-    place = np.clip((x / size * cells).astype(int), 0, cells - 1)
+    """Pairs (origin, other) within 3 x 3 x 3 cells at least as wide as `reach`; each pair once for its origin.
+
+    parts: coordinates along the edges, from 0 to 1. widths: between opposite faces [m].
+    """
+    cells = np.maximum((widths / reach).astype(int), 1)
+    place = np.clip((parts * cells).astype(int), 0, cells - 1)
     key = np.ravel_multi_index(place.T, cells)
     order = np.argsort(key, kind="stable")
     starts = np.searchsorted(key[order], np.arange(cells.prod() + 1))

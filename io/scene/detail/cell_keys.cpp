@@ -41,8 +41,11 @@ Section<StressLoad> stress_keys() {
   for (std::size_t k = 0; k < names.size(); ++k)
     keys.push_back(key<StressLoad>(
         names[k], "Pa", any,
-        "Component that the cell follows, positive where it pushes grains "
-        "together; one that is not given is driven at its rate.",
+        k < 3 ? "Component that the cell follows, positive where it pushes grains together; one that is not "
+                "given is driven at its rate."
+              : "Component that the cell follows, likewise: of the sign that contacts resist a shear with, "
+                "so that "
+                "a positive one shears towards negative rates.",
         [k](auto& load) -> auto& { return load.to[k]; }));
   keys.push_back(
       key<StressLoad>("ramp_time", "s", not_negative,

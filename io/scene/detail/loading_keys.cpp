@@ -121,7 +121,9 @@ Section<Wall> wall_keys() {
       std::move(material).or_else("the first"),
       name_key<Wall>("group", "Name of the [[group]] that it moves and reports with.", &Wall::group)
           .or_else("none"),
-      from_stage_key<Wall>("Stage with whose beginning the wall appears."),
+      from_stage_key<Wall>("Stage with whose beginning the wall appears. A `motion` of it has a from_stage "
+                           "of its own, and moves the "
+                           "wall before it appears, too."),
       until_stage_key<Wall>("Stage with whose beginning the wall vanishes, as the gate of a dam."),
       torque_point_key<Wall>(
           "a point of the axis of its first motion that turns, else that of its group, else "
@@ -186,15 +188,18 @@ Section<StageEnd> stage_end_keys() {
               "strain", "", positive,
               "Magnitude of the logarithmic strain along `strain_axis` since the beginning of the stage.",
               &StageEnd::strain),
-          choice<StageEnd>("strain_axis", {"x", "y", "z"},
-                           "Axis of `strain`; two walls must bound the sample along it.",
-                           &StageEnd::strain_axis)
+          choice<StageEnd>(
+              "strain_axis", {"x", "y", "z"},
+              "Axis of `strain`; two walls bound the sample along it, or a cell that is strained does.",
+              &StageEnd::strain_axis)
               .only("strain is given", [](const StageEnd& end) { return end.strain.has_value(); }),
-          key<StageEnd>(
-              "shear_strain", "", positive,
-              "Path of the shear of the periodic cell since the beginning of the stage: of simple shear "
-              "at the rate g for a time t, g t.",
-              &StageEnd::shear_strain),
+          key<StageEnd>("shear_strain", "", positive,
+                        "Path of the shear of the periodic cell since the beginning of the stage, with every "
+                        "deviatoric rate "
+                        "that it has, those that a stress makes among them: of simple shear at the rate g "
+                        "for a time t, "
+                        "g t.",
+                        &StageEnd::shear_strain),
           key<StageEnd>(
               "equilibrium", "", positive,
               "Bound on `equilibrium` of steps.csv: net forces over the load, and kinetic energy over load × "

@@ -9,7 +9,9 @@ Section<ProbeRule> probe_keys() {
       "A part of space that is looked at; probes.csv has a row for each probe and time. `[probe.region]` "
       "is a box or cylinder, whose contents are told; all beyond a plane, likewise, but for what needs "
       "a volume; or a disc or a plane: the grains whose centre goes through it, less those that go "
-      "back.",
+      "back. In a periodic cell all images of grains count; a plane there lies along two axes of the "
+      "cell, all beyond one is bounded along an axis of walls, and no surface counts in a cell whose "
+      "edges move.",
       {key<P>("name", "", any, "Name, unique among the probes.", &P::name).or_else("probe-1, probe-2, ..."),
        key<P>("every", "s", positive, "Time between rows.", &P::every),
        key<P>("every_steps", "", countable, "Steps between rows; with `every` at the first of both.",
@@ -22,7 +24,7 @@ Section<FieldRule> field_keys() {
   return {
       "[[field]]",
       "Density, solid fraction, velocity, temperature and stress on a grid, by coarse graining, with "
-      "every frame: fields/field_NAME_*.vti.",
+      "every frame: fields/field_NAME_*.vti. In a periodic cell with all images.",
       {key<F>("name", "", any, "Name, unique among the fields.", &F::name).or_else("field-1, field-2, ..."),
        key<F>("low", "m", any, "Lower corner of the grid.", &F::low).need(),
        key<F>("high", "m", any, "Upper corner of the grid.", &F::high).need(),

@@ -7,6 +7,7 @@
 
 #include "io/scene/detail/grain_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
+#include "runtime/step/cell.hpp"
 
 namespace talus::io::detail {
 
@@ -19,6 +20,8 @@ void read_probe(const toml::table& table, const std::string& path, Scene& scene)
   settle_name(table, path, "probe", scene.setup.probes, rule);
   rule.region =
       needed_region(table, path, {Kind::box, Kind::cylinder, Kind::beyond, Kind::disc, Kind::plane});
+  if (const std::string fault = fault_in_cell(scene.setup, rule.region); !fault.empty())
+    fail_at(table, path + ".region", fault);
   if (!rule.every && !rule.every_steps) rule.every_steps = scene.output.tables_every;
   scene.setup.probes.push_back(std::move(rule));
 }
@@ -27,7 +30,9 @@ void read_field(const toml::table& table, const std::string& path, Scene& scene)
   FieldRule rule;
   read_table(table, path, scene_keys().field, {}, rule);
   settle_name(table, path, "field", scene.setup.fields, rule);
-  if (const std::string fault = fault_of(rule); !fault.empty()) fail_at(table, path, fault);
+  for (const std::string& fault :
+       {fault_of(rule), fault_in_cell(scene.setup, {.low = rule.low, .high = rule.high})})
+    if (!fault.empty()) fail_at(table, path, fault);
   scene.setup.fields.push_back(std::move(rule));
 }
 

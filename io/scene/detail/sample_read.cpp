@@ -36,6 +36,10 @@ void check_random(const toml::table& table, const std::string& path, const Sampl
     if (!sample.region && edge == 0)
       fail_at(table, path + ".region",
               fmt::format("missing; random grains need a box, since nothing repeats along {}", "xyz"[axis]));
+    if (const double largest = 2 * largest_radius(sample.radii); edge > 0 && edge < 2 * largest)
+      fail_at(table, path,
+              fmt::format("has grains of {} m, and along {} the cell is {} m long: two of them have to fit",
+                          largest, "xyz"[axis], edge));
     if (!sample.region || edge == 0) continue;
     const double low = sample.region->low[axis], high = sample.region->high[axis];
     constexpr double rounding = 1e-12;  // of corners that are written in decimals

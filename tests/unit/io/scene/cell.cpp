@@ -86,6 +86,7 @@ TEST(CellScene, RefusesAStressThatTheCellCannotFollow) {
   refuse(stage("stress = { zz = 1 }\nstrain_rates = [0, 0, -1]"), "cell", "zz has a rate");
   refuse(stage("stress = { zz = 1, amplitude_xx = 2, period = 1 }"), "cell", "amplitude_xx");
   refuse(stage("stress = { zz = 1, amplitude_zz = 2 }"), "cell", "period");
+  refuse(stage("stress = { zz = 1, amplitude_zz = 2, period = 2e-4 }"), "cell", "a quarter of the period");
   refuse(stage("stress = { zz = 1 }") + "[decomposition]\ncoupling = \"alternating\"\n",
          "decomposition.coupling", "nscdd");
   refuse(stage("stress = { zz = 1 }") + "[solver]\noverlap_correction = 0.1\n", "solver.overlap_correction",
@@ -112,6 +113,9 @@ TEST(CellScene, ReadsAndWritesEndsByWhatTheGrainsDo) {
     EXPECT_EQ(ends.steady_strain, 0.25);
   }
   EXPECT_EQ(parsed(with_end("steady = 0.02, steady_time = 0.5", "")).setup.stages.at(0).end.steady_time, 0.5);
+  refuse(with_end("strain = 0.1", flow), "stage[0].end.strain", "the cell is not strained along that axis");
+  refuse(with_end("equilibrium = 1e-3", "stress = { xx = 0, yy = 0, zz = 0 }\n"), "stage[0].end.equilibrium",
+         "loads the sample");
   refuse(with_end("steady = 0.02", ""), "stage[0].end.steady", "give steady_time");
   refuse(with_end("inertial_below = 0.02", ""), "stage[0].end.inertial_below", "cell that flows");
   refuse(with_end("steady_strain = 0.5, steps = 3", flow), "stage[0].end.steady_strain", "steady is given");
@@ -164,10 +168,23 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
              "[[wall]]\nname = \"pipe\"\nshape = \"cylinder\"\nstart = [0, 0, 0]\nend = [0, 0, 1]\nradius = "
              "0.05\n[[stage]]"),
          "cell", "wall 'pipe' is no plane");
-  refuse(replaced(
-             cube, "[[stage]]",
-             "[[probe]]\nregion = { shape = \"box\", low = [0, 0, 0], high = [0.05, 0.1, 0.1] }\n[[stage]]"),
-         "cell", "know no images");
+  const auto looks = [](const std::string& region) {
+    return replaced(cube, "[[stage]]", "[[probe]]\nregion = { " + region + " }\n[[stage]]");
+  };
+  refuse(looks("shape = \"box\", low = [0, 0, 0], high = [1.7, 0.1, 0.1]"), "probe[0].region",
+         "is more than 16 edges of the cell long along x");
+  refuse(looks("shape = \"beyond\", point = [0, 0, 0.05], normal = [0, 0, 1]"), "probe[0].region",
+         "across z, where the cell repeats");
+  refuse(looks("shape = \"plane\", point = [0, 0, 0.05], normal = [0, 1, 1]"), "probe[0].region",
+         "normal has to lie along x, y or z");
+  refuse(replaced(looks("shape = \"plane\", point = [0, 0, 0.05], normal = [0, 0, 1]"), "[[stage]]",
+                  "[[stage]]\nstrain_rates = [0, 0, 0.1]"),
+         "probe[0].region", "the edges of the cell move");
+  refuse(replaced(cube, "[[stage]]",
+                  "[[field]]\nlow = [0, 0, 0]\nhigh = [0.1, 0.1, 2]\ncells = [9, 9, 99]\nwidth = "
+                  "0.1\n[[stage]]"),
+         "field[0]", "is more than 16 edges");
+  refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.005, 0.1]"), "sample", "two of them have to fit");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]"), "sample.region", "nothing repeats along z");
   refuse(replaced(cube, "count = 100", "count = 4000"), "sample[0].count", "no room for a grain");
   refuse(replaced(cube, "lengths", "shears = [0.01, 0, 0]\nlength"), "cell.length",

@@ -239,6 +239,24 @@ TEST(PeriodicRun, ForcesUnderAStressDoNotDependOnWhereTheFacesLie) {
   }
 }
 
+// Nothing says where a cell stands: a sample that drifts, or is sheared evenly, is as far from equilibrium as
+// one that does not.
+TEST(PeriodicRun, DriftIsNoUnrest) {
+  talus::Setup setup = colliding(20);
+  setup.stages[0].stress.to = {1e3, 1e3, 1e3, std::nullopt, std::nullopt, std::nullopt};
+  setup.decomposition.coupling = Coupling::nscdd;
+  Sample drifting = flying();
+  for (auto& velocity : drifting.velocity) velocity[1] += 30;
+  graph::Executor executor({.threads = 1});
+  Simulation one(setup, deal_out(flying(), setup.decomposition, graph::one_rank()), executor),
+      other(setup, deal_out(std::move(drifting), setup.decomposition, graph::one_rank()), executor);
+  for (int step = 0; step < 20; ++step) {
+    const double still = one.step().equilibrium;
+    ASSERT_GT(still, 0);
+    EXPECT_NEAR(other.step().equilibrium, still, 1e-6 * still) << step;
+  }
+}
+
 /// Grains that a stress pushes together, and grains that are squeezed, while they are sheared.
 struct DenseFlow {
   const char* name;
