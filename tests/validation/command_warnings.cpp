@@ -69,7 +69,7 @@ TEST_F(Warnings, OfATableThatJumpsOffTheMiddleOfAStep) {
   const std::string scene =
       replaced(replaced(column_scene, "friction = 0.35", "restitution = 0.5"), "side = \"z-\"",
                "side = \"z-\"\nmotion = [{ kind = \"table\", file = \"stroke.csv\" }]");
-  EXPECT_NE(of(scene).find("'floor' jumps at 0.05 s of stroke.csv"), std::string::npos) << of(scene);
+  EXPECT_NE(of(scene).find("'floor' jumps at 0.05 s of"), std::string::npos) << of(scene);
   EXPECT_NE(of(scene).find("the time 0.0505 s"), std::string::npos);
   write(at("stroke.csv"), "t,x,y,z\n0,0,0,0\n0.0505,0,0,0\n1,0,0,0.95\n");
   EXPECT_EQ(of(scene), "");
