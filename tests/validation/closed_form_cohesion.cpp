@@ -92,7 +92,7 @@ TEST(Cohesion, TakesNoEnergyFromElasticGrainsOfAnotherMaterial) {
       1e-9;
   scene.sphere({0, 0, 0}, r, 0.01, {1, 0, 0});
   scene.sphere({0.0201, 0, 0}, r, 0.01);
-  scene.sphere({0.020105 + 2 * r, 0, 0}, r, 0.01, {0.1, 0, 0});
+  scene.sphere({0.020105 + 2 * r, 0, 0}, r, 0.01, {1e-3, 0, 0});  // 5e-6 m apart, within a reach of 1e-5
   scene.bodies.material = {material_of_grains, material_of_grains, material_of_walls};
   Experiment run(std::move(scene));
   const double before = run.kinetic_energy();
