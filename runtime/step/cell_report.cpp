@@ -114,7 +114,9 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
     if (edges(axis, axis) == 0) edges(axis, axis) = 1;
   const Mat3 gradient = matrix_of(state.domain.rates) * edges.inverse();
   const Mat3 contact = outcome.sums.contacts.moment / (volume * outcome.parameters.impulse_time()),
-             kinetic = kinetic_moment(state, gradient, ranks) / volume;
+             kinetic =
+                 (report.kinetic_moment ? *report.kinetic_moment : kinetic_moment(state, gradient, ranks)) /
+                 volume;
   out.stress = symmetric(contact);
   out.kinetic_stress = symmetric(kinetic);
   out.p = contact.trace() / 3;

@@ -38,7 +38,10 @@ struct StepReport {
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
   std::optional<BodyPair> overlapping = {};              ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
-  double solid_fraction = 0;                             ///< 0 when the walls do not close a box
+  /// Of the motion against the flow and the mean (cell_report.hpp) [J], in a cell that nothing else bounds;
+  /// as equilibrium asks for it, the row of cell.csv need not sum it up again.
+  std::optional<Mat3> kinetic_moment = {};
+  double solid_fraction = 0;  ///< 0 when the walls do not close a box
   double equilibrium =
       0;  ///< distance from equilibrium: the larger of net forces over load and kinetic energy over
           ///< load x mean diameter (docs/theory.md, "Equilibrium"); infinite without a load

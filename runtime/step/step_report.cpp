@@ -32,18 +32,9 @@ double load_of(const StepOutcome& outcome) {
   return load;
 }
 
-/// Kinetic energy by which a sample is away from rest [J]. Where nothing but a cell bounds it that is the
-/// motion against the flow and against the mean: a sample that drifts or is sheared evenly is none the less
-/// at rest.
-double energy_of_unrest(const StepOutcome& outcome, const graph::Communicator& ranks) {
-  const KineticEnergy& energy = outcome.sums.motion.energy;
-  const Domain& domain = outcome.state.domain;
-  if (!(domain.edges().minCoeff() > 0)) return energy.translation + energy.rotation;
-  return 0.5 * kinetic_moment(outcome.state, gradient_before(domain, 0), ranks).trace() + energy.rotation;
-}
-
-/// StepReport::equilibrium.
-double distance_from_equilibrium(const StepOutcome& outcome, const graph::Communicator& ranks) {
+/// StepReport::equilibrium. Where nothing but a cell bounds the sample its motion is that against the flow
+/// and against the mean: a sample that drifts or is sheared evenly is none the less at rest.
+double distance_from_equilibrium(const StepOutcome& outcome, const std::optional<Mat3>& against_flow) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
   const double h = parameters.impulse_time(), load = load_of(outcome);
   double net = 0;
@@ -56,7 +47,8 @@ double distance_from_equilibrium(const StepOutcome& outcome, const graph::Commun
   for (std::size_t k = 0; k < 3; ++k)
     if (state.cell.follows[k] && state.cell.push[k] != 0)
       net = std::max(net, std::abs(state.cell.impulse[k] / state.cell.push[k] + 1));
-  const double energy = energy_of_unrest(outcome, ranks);
+  const double translation = against_flow ? 0.5 * against_flow->trace() : sums.motion.energy.translation;
+  const double energy = translation + sums.motion.energy.rotation;
   if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
   const Vec3 gained = sums.motion.impulse / h + sample.total_mass * parameters.gravity;
   return std::max({net, gained.norm() / load, energy / (load * sample.mean_diameter)});
@@ -117,7 +109,10 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   report.kinetic_rotation = sums.motion.energy.rotation;
   const double box = state.domain.volume(state.walls);
   report.solid_fraction = box > 0 ? sample.volume / box : 0;
-  report.equilibrium = distance_from_equilibrium(outcome, ranks);
+  report.kinetic_moment.reset();
+  if (state.domain.edges().minCoeff() > 0)
+    report.kinetic_moment = kinetic_moment(state, gradient_before(state.domain, 0), ranks);
+  report.equilibrium = distance_from_equilibrium(outcome, report.kinetic_moment);
   report.wall_s = elapsed;
   report.converged = certified(result, defect, report.passed, report.overlap, setup.solver);
 }
