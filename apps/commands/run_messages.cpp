@@ -129,7 +129,7 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
   for (const InsertReport& insert : simulation.inserted()) {
     terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
                  counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
-    if (insert.waiting > 0)
+    if (insert.no_room > 0 && insert.waiting > 0)
       terminal.warn(
           "warning: insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "
           "inserted.csv says when. Enlarge its region, raise its velocity, or ask for fewer",
@@ -193,9 +193,11 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         counted(static_cast<std::size_t>(tally.stagnated), "step"), tally.floor);
   if (tally.jammed > 0)
     terminal.warn(
-        "warning: in {} walls close on grains that cannot get away: no velocities keep all contacts from "
-        "approaching, so these steps have no solution and ended early. Push walls with a force instead of "
-        "driving them, slow them down, or remove what overlaps there",
+        "warning: in {} walls close on grains that cannot get away, or a cell does, or rebounds between near "
+        "walls: no velocities keep all contacts from approaching, so these steps have no solution and ended "
+        "early. Push walls with a force and cells with a stress instead of a velocity, slow them down, "
+        "remove "
+        "what overlaps there, or take restitution_law = \"moreau\" or a shorter time_step for such rebounds",
         counted(static_cast<std::size_t>(tally.jammed), "step"));
 }
 
@@ -206,8 +208,9 @@ std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& s
   return fmt::format(
       "{}{}",
       overlaps_alone ? "Reduce time_step"
-      : sweeps_done  ? "More sweeps would not help, every error_rms is within its tolerance: reduce time_step"
-                     : "Raise solver.max_iterations, reduce time_step",
+      : sweeps_done
+          ? "Reduce time_step, or raise solver.max_iterations: every error_rms is within its tolerance"
+          : "Raise solver.max_iterations, reduce time_step",
       summary.exit_code == exit_tolerance_missed ? ", or accept them with allow_unconverged = true" : "");
 }
 

@@ -126,9 +126,9 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
   }
   if (refused.empty()) return;
   throw std::invalid_argument(fmt::format(
-      "the checkpoint {} is of another scene: {}. Ends of stages, loads of walls, output and "
-      "checkpoints may change; for anything else, stresses of a cell among it, begin a run in another directory, from this state if you "
-      "like ([sample] kind = \"state\")",
+      "the checkpoint {} is of another scene: {}. Ends of stages, loads of walls, output and checkpoints "
+      "may change; for anything else, stresses of a cell among it, begin a run in another directory, from "
+      "this state if you like ([sample] kind = \"state\")",
       point.path.string(), fmt::join(refused, "; ")));
 }
 

@@ -89,38 +89,42 @@ void add_segregation(const io::Scene& scene, const Sample& sample, std::vector<s
                     low, high));
 }
 
-/// Nothing rolls without friction. Pairs of materials that no grain has never meet.
+/// Nothing rolls without friction. Pairs of materials that never meet are left out.
 void add_idle_rolling(const io::Scene& scene, const Sample& sample, std::vector<std::string>& warnings) {
-  std::set<Material> of_grains(sample.material.begin(), sample.material.end());
+  std::set<Material> of_grains(sample.material.begin(), sample.material.end()), of_all;
   if (sample.material.empty() && sample.size() > 0) of_grains.insert(material_of_grains);
   for (const InsertRule& rule : scene.setup.inserts) of_grains.insert(rule.material);
+  of_all = of_grains;
+  for (const Wall& wall : scene.setup.walls) of_all.insert(wall.material);
   const std::vector<std::string>& names = scene.setup.material_names;
   const auto name = [&](Material m) -> std::string {
     if (!names.empty()) return "'" + names.at(m) + "'";
     return m == material_of_grains ? "grains" : "walls";
   };
-  for (const Stage& stage : scene.setup.stages)
-    for (Material b = 0; stage.laws.knows(b); ++b)
-      for (Material a = 0; a <= b; ++a) {
-        const PairLaw& law = stage.laws.between(a, b);
-        if (law.rolling_resistance == 0 || law.friction > 0 ||
-            !(of_grains.contains(a) || of_grains.contains(b)))
-          continue;
+  const auto idle = [](const PairLaw& law) { return law.rolling_resistance > 0 && law.friction == 0; };
+  for (const Material a : of_grains)
+    for (const Material b : of_all) {
+      if (b < a && of_grains.contains(b)) continue;
+      const auto stage = std::ranges::find_if(scene.setup.stages,
+                                              [&](const Stage& of) { return idle(of.laws.between(a, b)); });
+      if (stage != scene.setup.stages.end())
         warnings.push_back(fmt::format(
             "rolling_resistance of {} and {} does nothing in stage '{}': they have no friction, and "
             "nothing rolls without it",
-            name(a), name(b), stage.name));
-      }
+            name(a), name(b), stage->name));
+    }
 }
 
 /// Row of a table of displacements at which grains that rebound feel two weaker impacts in place of one: its
 /// velocity jumps there, and not in the middle of a step, from where on walls move until the next middle. The
-/// second impact finds them on their way already, however short the steps are. 0: there is none.
-std::size_t split_jump(const MotionTable& table, double h) {
-  constexpr double part = 0.1, near = 0.01, apart = 4;  // of the fastest velocity; of a step; steps
+/// second impact finds them on their way already, however short the steps are. 0: there is none. Along
+/// `normal`, or in any direction where that is 0.
+std::size_t split_jump(const MotionTable& table, const Vec3& normal, double h) {
+  constexpr double part = 0.5, near = 0.01, apart = 4;  // of the fastest velocity; of a step; steps
   if (!table.velocity.empty() || table.shift.empty()) return 0;
   const auto velocity = [&](std::size_t k) {
-    return Vec3((table.shift[k + 1] - table.shift[k]) / (table.t[k + 1] - table.t[k]));
+    const Vec3 v = (table.shift[k + 1] - table.shift[k]) / (table.t[k + 1] - table.t[k]);
+    return normal.isZero(0) ? v : Vec3(normal.dot(v) * normal);
   };
   double fastest = 0;
   for (std::size_t k = 0; k + 1 < table.t.size(); ++k) fastest = std::max(fastest, velocity(k).norm());
@@ -134,21 +138,32 @@ std::size_t split_jump(const MotionTable& table, double h) {
 }
 
 void add_jumps(const io::Scene& scene, std::vector<std::string>& warnings) {
-  const auto rebounds = [](const Stage& of) {
-    return of.time_step > 0 && of.laws.largest(&PairLaw::restitution) > 0;
-  };
-  const auto stage = std::ranges::find_if(scene.setup.stages, rebounds);
-  if (stage == scene.setup.stages.end()) return;
+  const std::vector<Stage>& stages = scene.setup.stages;
+  std::set<std::string> told;  // files
   for (const Wall& wall : scene.setup.walls)
-    for (const MotionPart& part : wall.motion)
-      if (const std::size_t row = part.table ? split_jump(*part.table, stage->time_step) : 0; row > 0)
-        warnings.push_back(fmt::format(
-            "the velocity of wall '{}' jumps at {:g} s of {}, which is not the middle of a step: grains "
-            "rebound "
-            "from it as from two weaker impacts, however short the steps are. Give the row the time {:g} s, "
-            "or "
-            "let a motion of one velocity begin there with a stage",
-            wall.name, part.table->t[row], part.file, part.table->t[row] + 0.5 * stage->time_step));
+    for (const MotionPart& motion : wall.motion) {
+      if (!motion.table || motion.surface_only || told.contains(motion.file)) continue;
+      // The first stage of its motion in which grains rebound; begins of stages are ends of steps.
+      auto stage = motion.from_stage.empty() ? stages.begin()
+                                             : std::ranges::find(stages, motion.from_stage, &Stage::name);
+      stage = std::find_if(stage, stages.end(), [](const Stage& of) {
+        return of.time_step > 0 && of.laws.largest(&PairLaw::restitution) > 0;
+      });
+      if (stage == stages.end()) continue;
+      const double h = stage->time_step;
+      const Vec3 normal = wall.surface() == nullptr ? wall.normal : Vec3(Vec3::Zero());
+      const std::size_t row = split_jump(*motion.table, normal, h);
+      if (row == 0) continue;
+      told.insert(motion.file);
+      const double t = motion.table->t[row];
+      warnings.push_back(
+          fmt::format("the velocity of wall '{}' jumps at {:.10g} s of {}, which is not the middle of a "
+                      "step: grains rebound "
+                      "from it as from two weaker impacts, however short the steps are. Give the row the "
+                      "time {:.10g} s, or "
+                      "let a motion of one velocity begin there with a stage",
+                      wall.name, t, motion.file, (std::floor(t / h * (1 + 1e-12)) + 0.5) * h));
+    }
 }
 
 }  // namespace

@@ -344,7 +344,7 @@ class SceneReader {
       fail_at(*node, end_path + ".shear_strain",
               "the cell has no rates and no stress in this stage: it would never end");
     const bool of_cell = scene_.setup.domain.edges()[end.strain_axis] > 0;
-    if (end.strain && !ends_else &&
+    if (end.strain && !ends_else && !(end.shear_strain && flows) &&
         (of_cell ? !stage.strains(end.strain_axis) : !flows && stands_still(scene_.setup.walls, in_force)))
       fail_at(*node, end_path + ".strain",
               of_cell ? "the cell is not strained along that axis in this stage: it would never end"

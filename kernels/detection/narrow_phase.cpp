@@ -69,6 +69,8 @@ OwnLaws own_laws(const ChunkPhase& phase, std::span<const ContactBody> first,
   OwnLaws own;
   if (phase.chunks.law[phase.chunk] != mixed_laws) return own;
   const MaterialView materials = materials_of(phase.in);
+  own.restitution.reserve(first.size());
+  own.reach.reserve(first.size());
   for (std::size_t k = 0; k < first.size(); ++k) {
     const PairLaw& law = phase.in.laws.laws()[materials.law(GrainPair{first[k], second[k]})];
     own.restitution.push_back(law.restitution);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "kernels/fields/lucy.hpp"
 #include "runtime/step/stressed_cell.hpp"
 
 namespace talus {
@@ -74,7 +75,7 @@ void validate_stress(const Setup& setup, const Stage& stage) {
       refuse(fmt::format("amplitude_{0} swings about {0}, which is not given", names[k]));
   }
   if (swings && !(load.period > 0)) refuse("swings need a period > 0 [s]");
-  const double step = stage.chooses_time_step ? stage.time_step_max : stage.time_step;
+  const double step = stage.chooses_time_step ? 0 : stage.time_step;
   constexpr double steps = 4;  // in which a swing still has its amplitude
   if (swings && load.period < steps * step)
     refuse(
@@ -86,8 +87,11 @@ void validate_stress(const Setup& setup, const Stage& stage) {
 
 /// "" or what is wrong with the size of a part of space, where all images in it count.
 std::string too_wide(const Domain& domain, const Bounds& box) {
-  constexpr double most = 16;  // edges
+  constexpr double most = 16, farthest = 1e6;  // edges
   const Vec3 edges = domain.edges();
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (edges[axis] > 0 && !((box.low - domain.low).cwiseAbs()[axis] <= farthest * edges[axis]))
+      return fmt::format("is more than {:g} edges away from the cell along {}", farthest, "xyz"[axis]);
   for (const Eigen::Index axis : {0, 1, 2})
     if (edges[axis] > 0 && !(box.high[axis] - box.low[axis] <= most * edges[axis]))
       return fmt::format("is more than {} edges of the cell long along {}; all images in it count", most,
@@ -113,9 +117,16 @@ std::string fault_in_cell(const Setup& setup, const Region& region) {
   }
   const bool moves = any_stress(setup) || std::ranges::any_of(setup.stages, &Stage::flows);
   if (moves) return "is a surface, and the edges of the cell move: what goes through it is not counted there";
-  if (region.kind == Region::Kind::plane && (region.normal.array() != 0).count() > 1)
+  const bool across = ((region.normal.array() != 0) && (edges.array() > 0)).any();
+  if (region.kind == Region::Kind::plane && across && (region.normal.array() != 0).count() > 1)
     return "is a plane; in a cell its normal has to lie along x, y or z";
   return region.kind == Region::Kind::disc ? too_wide(setup.domain, bounds_of(region)) : "";
+}
+
+std::string fault_in_cell(const Setup& setup, const FieldRule& field) {
+  const Vec3 reach = Vec3::Constant(Lucy(field.width).cutoff());
+  const std::string fault = too_wide(setup.domain, {field.low - reach, field.high + reach});
+  return fault.empty() ? "" : "with what it spreads grains over " + fault;
 }
 
 bool bounded(const Setup& setup, Eigen::Index axis) {
@@ -157,8 +168,7 @@ void validate_cell(const Setup& setup) {
     if (const std::string fault = fault_in_cell(setup, probe.region); !fault.empty())
       refuse(fmt::format("probe '{}' {}", probe.name, fault));
   for (const FieldRule& field : setup.fields)
-    if (const std::string fault = fault_in_cell(setup, {.low = field.low, .high = field.high});
-        !fault.empty())
+    if (const std::string fault = fault_in_cell(setup, field); !fault.empty())
       refuse(fmt::format("field '{}' {}", field.name, fault));
 }
 

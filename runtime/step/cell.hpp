@@ -14,6 +14,8 @@ void validate_cell(const Setup& setup);
 /// What is wrong with a part of space that is looked at, in the cell with all images; "" if nothing, and
 /// between walls.
 std::string fault_in_cell(const Setup& setup, const Region& region);
+/// ... or with a grid, to which all images within the reach of its function belong.
+std::string fault_in_cell(const Setup& setup, const FieldRule& field);
 
 /// Something stands at both ends of an axis: walls, or the images of the cell.
 bool bounded(const Setup& setup, Eigen::Index axis);

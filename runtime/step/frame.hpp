@@ -38,8 +38,8 @@ struct StepReport {
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
   std::optional<BodyPair> overlapping = {};              ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
-  /// Of the motion against the flow and the mean (cell_report.hpp) [J], in a cell that nothing else bounds;
-  /// as equilibrium asks for it, the row of cell.csv need not sum it up again.
+  /// Of the motion against the flow and the mean (cell_report.hpp) [J], in a loaded cell that nothing else
+  /// bounds; as equilibrium asks for it, the row of cell.csv need not sum it up again.
   std::optional<Mat3> kinetic_moment = {};
   double solid_fraction = 0;  ///< 0 when the walls do not close a box
   double equilibrium =
@@ -179,7 +179,8 @@ struct CellReport {
   std::array<double, 6> fabric{};    ///< mean of n (x) n over the contacts that carry, symmetric: xx, ..., yz
   double a_c = 0, a_n = 0, a_t = 0;  ///< anisotropies along the stress (runtime/step/force_fabric.hpp)
   double fabric_q_over_p = 0;        ///< q/p that these make together (stress_ratio_of)
-  double inertial_number = 0;        ///< rate of shear x mean diameter x root of density over p; 0 without p
+  double inertial_number = 0;        ///< rate of shear x mean diameter x root of density over p; infinite
+                                     ///< in a flow that nothing presses
   bool converged = true;             ///< of the step (StepReport)
 };
 

@@ -69,12 +69,7 @@ void check_strain(const StepState& state, double time_step, double most, const S
 double cohesive_energy(const StepOutcome& outcome) {
   const double mass = outcome.sample.total_mass;
   if (!(mass > 0)) return 0;
-  const TouchingRadii radii{0.5 * outcome.sample.mean_diameter, std::numeric_limits<double>::infinity()};
-  double cohesion = 0;
-  for (const PairLaw& law : outcome.parameters.laws.laws())
-    cohesion = std::max(cohesion, law.cohesion_of(radii));
-  const double impulse = cohesion * outcome.parameters.impulse_time();
-  const double speed = impulse * static_cast<double>(outcome.sample.bodies) / mass;
+  const double speed = cohesive_impulse(outcome) * static_cast<double>(outcome.sample.bodies) / mass;
   return 0.5 * mass * speed * speed;
 }
 

@@ -77,9 +77,12 @@ struct StressLoad {
   bool any() const {
     return std::ranges::any_of(to, [](const auto& component) { return component.has_value(); });
   }
-  /// Some component aims at more than 0.
+  /// A face of the cell is pushed or pulled, at times: a normal component aims at something, swings about it,
+  /// or comes from it in a ramp.
   bool presses() const {
-    return std::ranges::any_of(to, [](const auto& component) { return component.value_or(0) != 0; });
+    for (std::size_t k = 0; k < 3; ++k)
+      if (to[k] && (*to[k] != 0 || amplitude[k] != 0 || ramp_time > 0)) return true;
+    return false;
   }
 };
 

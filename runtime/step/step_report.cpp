@@ -44,9 +44,11 @@ double distance_from_equilibrium(const StepOutcome& outcome, const std::optional
     net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
                             std::abs(applied));
   }
-  for (std::size_t k = 0; k < 3; ++k)
-    if (state.cell.follows[k] && state.cell.push[k] != 0)
-      net = std::max(net, std::abs(state.cell.impulse[k] / state.cell.push[k] + 1));
+  double largest = 0;
+  for (const double push : state.cell.push) largest = std::max(largest, std::abs(push));
+  for (std::size_t k = 0; k < cell_freedoms; ++k)
+    if (const double unit = k < 3 ? std::abs(state.cell.push[k]) : largest; state.cell.follows[k] && unit > 0)
+      net = std::max(net, std::abs(state.cell.impulse[k] + state.cell.push[k]) / unit);
   const double translation = against_flow ? 0.5 * against_flow->trace() : sums.motion.energy.translation;
   const double energy = translation + sums.motion.energy.rotation;
   if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
@@ -55,6 +57,14 @@ double distance_from_equilibrium(const StepOutcome& outcome, const std::optional
 }
 
 }  // namespace
+
+double cohesive_impulse(const StepOutcome& outcome) {
+  const TouchingRadii radii{0.5 * outcome.sample.mean_diameter, std::numeric_limits<double>::infinity()};
+  double cohesion = 0;
+  for (const PairLaw& law : outcome.parameters.laws.laws())
+    cohesion = std::max(cohesion, law.cohesion_of(radii));
+  return cohesion * outcome.parameters.impulse_time();
+}
 
 double fall_time(const StepOutcome& outcome) {
   const double load = load_of(outcome);
@@ -79,6 +89,8 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   // What rounding leaves of the sample's momentum, at most sqrt(2 E M), is no defect.
   const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
   impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * sample.total_mass));
+  // Nor what it leaves of pulls and pushes that cancel.
+  impulse_unit = std::max(impulse_unit, 1e-9 * cohesive_impulse(outcome));
   const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
   report.step = step.number;
   report.time += parameters.time_step;
@@ -110,7 +122,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   const double box = state.domain.volume(state.walls);
   report.solid_fraction = box > 0 ? sample.volume / box : 0;
   report.kinetic_moment.reset();
-  if (state.domain.edges().minCoeff() > 0)
+  if (state.domain.edges().minCoeff() > 0 && load_of(outcome) > 0)
     report.kinetic_moment = kinetic_moment(state, gradient_before(state.domain, 0), ranks);
   report.equilibrium = distance_from_equilibrium(outcome, report.kinetic_moment);
   report.wall_s = elapsed;

@@ -45,6 +45,10 @@ std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const 
                                               const Stage& stage, const Vec3& strain,
                                               const graph::Communicator& ranks);
 
+/// The largest impulse by which attraction holds a grain of mean size at a wall in a step [N s]; 0 without
+/// any.
+double cohesive_impulse(const StepOutcome& outcome);
+
 /// Time in which the sample would fall by a mean diameter d, were its load all that moves it [s]:
 /// sqrt(2 d m / load). Load is the weight plus the sum of the forces on pushed walls; under gravity alone
 /// that is the free fall of a grain. 0 without a load.

@@ -100,6 +100,22 @@ TEST(Cohesion, TakesNoEnergyFromElasticGrainsOfAnotherMaterial) {
   EXPECT_NEAR(run.kinetic_energy(), before, 1e-6 * before);
 }
 
+/// A grain that sticks to a wall and rests, with nothing else at work: what rounding leaves of its momentum
+/// over what rounding leaves of the forces is no error.
+TEST(Cohesion, AGrainAtRestWithoutWeightIsCertifiedForGood) {
+  Scene scene(1e-4);
+  scene.setup.solver = {};
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.stage().laws.set_all(cohesion_attraction, 0.1);
+  scene.stage().laws.set_all(&PairLaw::restitution, 0.5);
+  scene.sphere({0, 0, 0.01002}, 0.01, 0.011, {0, 0, -0.01});
+  Experiment run(std::move(scene));
+  for (int step = 0; step < 400; ++step) {
+    run.step();
+    ASSERT_TRUE(run.simulation().report().converged) << step;
+  }
+}
+
 /// Nothing is at work but what pulls the grains together: the trifle by which a step is off is no runaway.
 TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
   constexpr double r = 0.002;

@@ -71,6 +71,10 @@ TEST_F(Warnings, OfATableThatJumpsOffTheMiddleOfAStep) {
                "side = \"z-\"\nmotion = [{ kind = \"table\", file = \"stroke.csv\" }]");
   EXPECT_NE(of(scene).find("'floor' jumps at 0.05 s of"), std::string::npos) << of(scene);
   EXPECT_NE(of(scene).find("the time 0.0505 s"), std::string::npos);
+  write(at("stroke.csv"), "t,x,y,z\n0,0,0,0\n0.0503,0,0,0\n1,0,0,0.95\n");
+  EXPECT_NE(of(scene).find("the time 0.0505 s"), std::string::npos);
+  write(at("stroke.csv"), "t,x,y,z\n0,0,0,0\n0.05,0,0,0\n1,0.95,0,0\n");
+  EXPECT_EQ(of(scene), "") << "a floor that begins to slide throws nobody";
   write(at("stroke.csv"), "t,x,y,z\n0,0,0,0\n0.0505,0,0,0\n1,0,0,0.95\n");
   EXPECT_EQ(of(scene), "");
 }

@@ -25,9 +25,9 @@ def fabric_tensor(normals: ArrayLike) -> np.ndarray:
 def anisotropy(fabric: ArrayLike) -> float:
     """Anisotropy of a fabric tensor, a = 5 sqrt(3/2 D:D) with its deviator D = F - I/3 tr F; 0 without direction.
 
-    Where normals are distributed about an axis as (1 + a (3 cos² - 1)/2)/4π over the sphere, |a| comes out. The `a_c` of
-    cell.csv is defined otherwise (docs/theory.md): along the deviator of the stress, and 1.5 times this one where both
-    have the same axes.
+    Where normals are distributed about an axis as (1 + a (3 cos² - 1)/2)/4π over the sphere, |a| comes out. The
+    `a_c` of cell.csv is defined otherwise (docs/theory.md): along the deviator of the stress, and 1.5 times this one
+    where both have the same axes.
     """
     f = np.asarray(fabric, dtype=float)
     deviator = f - np.eye(3) * np.trace(f) / 3
@@ -63,8 +63,9 @@ def pair_correlation(
     """Pair correlation g(r) up to r_max: density of centres at a distance r from a centre, over the mean density.
 
     positions: centres [m], shape (n, 3). low, high: corners of the box that holds them [m]; a box of periodic directions
-    is the brick of the cell, whose edges may lean by `shears` (xy, xz, yz) [m]. In the others only grains farther than r_max from both faces are counted from, so that every shell is
-    whole; the mean density is that of the box. bins: shells of equal thickness.
+    is the brick of the cell, whose edges may lean by `shears` (xy, xz, yz) [m]. In the others only grains farther than
+    r_max from both faces are counted from, so that every shell is whole; the mean density is that of the box. bins:
+    shells of equal thickness.
     Returns the mean radius of each shell [m] and g [1]; time and memory grow as n times the neighbours within r_max.
 
     Raises ValueError where r_max is no distance of this box: more than half of it between two of its faces; and for
@@ -73,7 +74,7 @@ def pair_correlation(
     x, low, high = np.asarray(positions, float).reshape(-1, 3), np.asarray(low, float), np.asarray(high, float)
     size, wraps = high - low, np.broadcast_to(np.asarray(periodic, bool), 3)
     edges_of_cell, pairs = np.diag(size), ((0, 1), (0, 2), (1, 2))
-    for (i, j), shear in zip(pairs, np.asarray(shears, float)):
+    for (i, j), shear in zip(pairs, np.broadcast_to(np.asarray(shears, float), 3)):
         edges_of_cell[i, j] = shear
         if shear != 0 and not (wraps[i] and wraps[j]):
             raise ValueError("shears: both directions of one that is not 0 have to be periodic")

@@ -9,8 +9,9 @@ Section<ProbeRule> probe_keys() {
       "A part of space that is looked at; probes.csv has a row for each probe and time. `[probe.region]` "
       "is a box or cylinder, whose contents are told; all beyond a plane, likewise, but for what needs "
       "a volume; or a disc or a plane: the grains whose centre goes through it, less those that go "
-      "back. In a periodic cell all images of grains count; a plane there lies along two axes of the "
-      "cell, all beyond one is bounded along an axis of walls, and no surface counts in a cell whose "
+      "back. In a periodic cell all images of grains count; a plane across an axis that repeats is "
+      "at right angles to it and counts once a cell, all beyond a plane is bounded along an axis of walls, "
+      "and no surface counts in a cell whose "
       "edges move.",
       {key<P>("name", "", any, "Name, unique among the probes.", &P::name).or_else("probe-1, probe-2, ..."),
        key<P>("every", "s", positive, "Time between rows.", &P::every),

@@ -21,7 +21,7 @@ void read_probe(const toml::table& table, const std::string& path, Scene& scene)
   rule.region =
       needed_region(table, path, {Kind::box, Kind::cylinder, Kind::beyond, Kind::disc, Kind::plane});
   if (const std::string fault = fault_in_cell(scene.setup, rule.region); !fault.empty())
-    fail_at(table, path + ".region", fault);
+    fail_at(table, path + ".region", fmt::format("probe '{}' {}", rule.name, fault));
   if (!rule.every && !rule.every_steps) rule.every_steps = scene.output.tables_every;
   scene.setup.probes.push_back(std::move(rule));
 }
@@ -30,8 +30,7 @@ void read_field(const toml::table& table, const std::string& path, Scene& scene)
   FieldRule rule;
   read_table(table, path, scene_keys().field, {}, rule);
   settle_name(table, path, "field", scene.setup.fields, rule);
-  for (const std::string& fault :
-       {fault_of(rule), fault_in_cell(scene.setup, {.low = rule.low, .high = rule.high})})
+  for (const std::string& fault : {fault_of(rule), fault_in_cell(scene.setup, rule)})
     if (!fault.empty()) fail_at(table, path, fault);
   scene.setup.fields.push_back(std::move(rule));
 }

@@ -184,6 +184,12 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
                   "[[field]]\nlow = [0, 0, 0]\nhigh = [0.1, 0.1, 2]\ncells = [9, 9, 99]\nwidth = "
                   "0.1\n[[stage]]"),
          "field[0]", "is more than 16 edges");
+  refuse(replaced(cube, "[[stage]]",
+                  "[[field]]\nlow = [0, 0, 0]\nhigh = [0.1, 0.1, 0.1]\ncells = [2, 2, 2]\nwidth = "
+                  "10\n[[stage]]"),
+         "field[0]", "with what it spreads grains over is more than 16 edges");
+  refuse(looks("shape = \"disc\", centre = [1e20, 0, 0], axis = [1, 0, 0], radius = 0.01"), "probe[0].region",
+         "edges away from the cell");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.005, 0.1]"), "sample", "two of them have to fit");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]"), "sample.region", "nothing repeats along z");
   refuse(replaced(cube, "count = 100", "count = 4000"), "sample[0].count", "no room for a grain");

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "runtime/graph/one_rank.hpp"
+#include "runtime/graph/pretend_ranks.hpp"
+#include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/runtime/step/loose_scenes.hpp"
 
@@ -27,16 +29,23 @@ Region box(const Vec3& low, const Vec3& high) {
   return region;
 }
 
-/// The nearest whole number of edges is taken off, axis by axis: of an upright cell.
-Vec3 nearest(Vec3 d) {
-  for (double& along : d) along -= edge * std::round(along / edge);
-  return d;
+/// Of all images of a difference the shortest.
+Vec3 nearest(const Domain& domain, const Vec3& d) {
+  const PeriodicSpace& h = domain.cell;
+  Vec3 best = d;
+  for (int k = 0; k < 125; ++k) {
+    const Vec3 n(k % 5 - 2, k / 5 % 5 - 2, k / 25 - 2);
+    const Vec3 image =
+        d + Vec3(h.xx * n[0] + h.xy * n[1] + h.xz * n[2], h.yy * n[1] + h.yz * n[2], h.zz * n[2]);
+    if (image.norm() < best.norm()) best = image;
+  }
+  return best;
 }
 
-/// 216 grains that fly about in a cube and hit one another.
-Simulation colliding(graph::Executor& executor, int subdomains, const Vec3& low) {
+/// 216 grains that fly about in a cell and hit one another.
+talus::Setup colliding(int subdomains, const Vec3& low, const Vec3& shears = Vec3::Zero()) {
   talus::Setup setup;
-  setup.domain = periodic_domain(Vec3::Constant(edge));
+  setup.domain = periodic_domain(Vec3::Constant(edge), Vec3::Zero(), shears);
   setup.stages = {stage("fly", 30)};
   setup.stages[0].laws = laws_of_one_material(0.4, 0.4, 0);
   setup.decomposition.subdomains = subdomains;
@@ -44,13 +53,21 @@ Simulation colliding(graph::Executor& executor, int subdomains, const Vec3& low)
                   {"left", box(low, low + edge * Vec3(0.3, 1, 1)), {}, 1},
                   {"right", box(low + edge * Vec3(0.3, 0, 0), low + Vec3::Constant(edge)), {}, 1}};
   setup.fields = {{"all", low, low + Vec3::Constant(edge), {12, 10, 15}, 1.3 * radius}};
-  Bodies bodies = loose_sample(6, 6, 6, 11);
+  return setup;
+}
+
+Sample flying() {
+  const Bodies bodies = loose_sample(6, 6, 6, 11);
   test::Random random(12);
-  for (Velocity& v : bodies.velocity) {
+  Sample sample;
+  sample.density = density;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    sample.x.push_back(bodies.x[k]);
+    sample.radius.push_back(bodies.radius[k]);
     const Vec3 u = test::uniform_vector(random, -0.5, 0.5);
-    std::copy_n(u.data(), 3, v.u);
+    sample.velocity.push_back({u[0], u[1], u[2], 0, 0, 0});
   }
-  return Simulation(setup, std::move(bodies), executor);
+  return sample;
 }
 
 /// What the frame says of the whole cell.
@@ -70,7 +87,7 @@ Whole whole_of(const Frame& frame) {
   }
   for (std::size_t k = 0; k < frame.contact_bodies.size(); ++k) {
     const auto& [i, j] = frame.contact_bodies[k];
-    const Vec3 branch = nearest(frame.x[place.at(i)] - frame.x[place.at(j)]);
+    const Vec3 branch = nearest(frame.domain, frame.x[place.at(i)] - frame.x[place.at(j)]);
     whole.stress += frame.contact_force[k] * branch.transpose() / (edge * edge * edge);
   }
   return whole;
@@ -82,7 +99,8 @@ TEST(LooksInCells, AsLargeAsTheCellHoldAllOfIt) {
   bool pressed = false;
   for (const Vec3& low : {Vec3(0, 0, 0), Vec3(0.37 * edge, -0.61 * edge, 3.2 * edge)})
     for (const int subdomains : {1, 8}) {
-      Simulation simulation = colliding(executor, subdomains, low);
+      const talus::Setup setup = colliding(subdomains, low);
+      Simulation simulation(setup, deal_out(flying(), setup.decomposition, graph::one_rank()), executor);
       while (!simulation.finished()) {
         simulation.step();
         const Whole whole = whole_of(simulation.frame());
@@ -118,6 +136,41 @@ TEST(LooksInCells, AsLargeAsTheCellHoldAllOfIt) {
   EXPECT_TRUE(pressed) << "no contact carried";
 }
 
+// Likewise in a cell that leans, and with the same bits on several ranks.
+TEST(LooksInCells, LeaningCellsAreHeldByTheirBricksOnAnyRanks) {
+  // Of a lattice: no grain meets an image.
+  const talus::Setup setup =
+      colliding(8, {0.4 * edge, 0.1 * edge, -0.7 * edge}, edge * Vec3(1.0 / 3, -1.0 / 6, 0.5));
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, deal_out(flying(), setup.decomposition, graph::one_rank()), executor);
+  std::vector<Mat3> stresses;
+  bool pressed = false;
+  for (; !simulation.finished(); simulation.begin_next_stage()) {
+    simulation.step();
+    const Whole whole = whole_of(simulation.frame());
+    pressed = pressed || whole.stress.norm() > 1;
+    for (const ProbeReport& report : simulation.probes()) stresses.push_back(report.contact_stress);
+    EXPECT_EQ(simulation.probes().at(0).count, 216);
+    EXPECT_LT((simulation.probes().at(0).contact_stress - whole.stress).norm(),
+              1e-9 * (1 + whole.stress.norm()));
+  }
+  EXPECT_TRUE(pressed) << "no contact carried";
+  const std::vector<double> numbers = simulation.frame().grids.at(0).sums.numbers;
+  graph::on_pretend_ranks(2, [&](const graph::Communicator& ranks) {
+    graph::Executor own({.threads = 2});
+    Simulation part(setup, deal_out(ranks.rank() == 0 ? flying() : Sample{}, setup.decomposition, ranks), own,
+                    ranks);
+    for (std::size_t k = 0; !part.finished(); part.begin_next_stage()) {
+      part.step();
+      for (const ProbeReport& report : part.probes()) EXPECT_EQ(report.contact_stress, stresses.at(k++));
+    }
+    const Frame frame = part.frame();
+    if (ranks.rank() == 0) {
+      EXPECT_EQ(frame.grids.at(0).sums.numbers, numbers);
+    }
+  });
+}
+
 // In a shear flow images one edge further up are faster by what the flow says, in probes and fields alike.
 TEST(LooksInCells, ImagesMoveWithTheFlow) {
   constexpr double rate = 3;
@@ -127,9 +180,7 @@ TEST(LooksInCells, ImagesMoveWithTheFlow) {
   setup.stages[0].shear_rates = {0, rate, 0};  // dv_x/dz
   const auto slice = [](double from, double to) { return box({0, 0, from}, {edge, edge, to}); };
   setup.probes = {{"here", slice(0, 0.5 * edge), {}, 40}, {"above", slice(edge, 1.5 * edge), {}, 40}};
-  setup.fields = {{"two", Vec3::Zero(), {edge, edge, 2 * edge}, {1, 1, 20}, 1.1 * edge}};
-  setup.fields[0].cells = {8, 8, 20};
-  setup.fields[0].width = 0.2 * edge;
+  setup.fields = {{"two", Vec3::Zero(), {edge, edge, 2 * edge}, {8, 8, 20}, 0.2 * edge}};
   graph::Executor executor({.threads = 1});
   Simulation simulation(setup, loose_sample(6, 6, 6, 11), executor);
   for (; !simulation.finished(); simulation.begin_next_stage()) simulation.step();

@@ -239,8 +239,7 @@ TEST(PeriodicRun, ForcesUnderAStressDoNotDependOnWhereTheFacesLie) {
   }
 }
 
-// Nothing says where a cell stands: a sample that drifts, or is sheared evenly, is as far from equilibrium as
-// one that does not.
+// Nothing says where a cell stands: a sample that drifts is as far from equilibrium as one that does not.
 TEST(PeriodicRun, DriftIsNoUnrest) {
   talus::Setup setup = colliding(20);
   setup.stages[0].stress.to = {1e3, 1e3, 1e3, std::nullopt, std::nullopt, std::nullopt};

@@ -111,6 +111,22 @@ TEST(StressRatio, EndsAStageWithTheStepThatReachesIt) {
   EXPECT_EQ(simulation.steps_of_stage(), 101);
 }
 
+// Cubes of smooth grains bear no shear: a cell that is sheared ever faster by a stress is in no equilibrium,
+// though its normal stresses are.
+TEST(Equilibrium, OfACellIsThatOfAllComponentsThatFollow) {
+  StressLoad load;
+  load.to = {1e3, 1e3, 1e3, {}, 3e2, {}};
+  StageEnd end;
+  end.equilibrium = 0.01;
+  graph::Executor executor({});
+  Simulation simulation = lattice(load, end, executor);
+  for (int step = 0; step < 3; ++step) {
+    const StepReport& report = simulation.step();
+    EXPECT_GT(report.equilibrium, 0.29) << step;
+    EXPECT_LT(report.equilibrium, 0.31) << step;
+  }
+}
+
 // d root of rho over p = 0.02 sqrt(1000/1000) s: three of them are 60 steps.
 TEST(InertialNumber, MustBeLowForInertialTimesAlsoAcrossASavedState) {
   StressLoad load;
