@@ -38,10 +38,7 @@ struct StepReport {
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
   std::optional<BodyPair> overlapping = {};              ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
-  /// Of the motion against the flow and the mean (cell_report.hpp) [J], in a loaded cell that nothing else
-  /// bounds; as equilibrium asks for it, the row of cell.csv need not sum it up again.
-  std::optional<Mat3> kinetic_moment = {};
-  double solid_fraction = 0;  ///< 0 when the walls do not close a box
+  double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   double equilibrium =
       0;  ///< distance from equilibrium: the larger of net forces over load and kinetic energy over
           ///< load x mean diameter (docs/theory.md, "Equilibrium"); infinite without a load
@@ -51,6 +48,9 @@ struct StepReport {
   bool converged = false;
   std::int64_t passed = 0;  ///< pairs that went through one another, or deep into one another, within the
                             ///< step: the step is too long for them, and counts as not converged
+  /// Of the motion against the flow and the mean (cell_report.hpp) [J], in a loaded cell that nothing else
+  /// bounds; as equilibrium asks for it, the row of cell.csv need not sum it up again.
+  std::optional<Mat3> kinetic_moment = {};
 };
 
 /// visit(name, number) for each number of a report; names of bodies are left out.
