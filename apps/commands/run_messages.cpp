@@ -205,13 +205,11 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
 std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& solver) {
   const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps,
              sweeps_done = summary.worst_error_rms <= solver.tolerance;
-  return fmt::format(
-      "{}{}",
-      overlaps_alone ? "Reduce time_step"
-      : sweeps_done
-          ? "Reduce time_step, or raise solver.max_iterations: every error_rms is within its tolerance"
-          : "Raise solver.max_iterations, reduce time_step",
-      summary.exit_code == exit_tolerance_missed ? ", or accept them with allow_unconverged = true" : "");
+  std::string remedy = "Raise solver.max_iterations, reduce time_step";
+  if (sweeps_done) remedy = "Every error_rms is within its tolerance, so reduce time_step first";
+  if (overlaps_alone) remedy = "Reduce time_step";
+  if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
+  return remedy;
 }
 
 void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <span>
 
 #include "apps/shared/sample_builder.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -120,37 +121,52 @@ void add_idle_rolling(const io::Scene& scene, const Sample& sample, std::vector<
 /// second impact finds them on their way already, however short the steps are. 0: there is none. Along
 /// `normal`, or in any direction where that is 0.
 std::size_t split_jump(const MotionTable& table, const Vec3& normal, double h) {
-  constexpr double part = 0.5, near = 0.01, apart = 4;  // of the fastest velocity; of a step; steps
+  // Of the fastest velocity along the normal, and of the fastest one, less than which is noise; of a step;
+  // steps.
+  constexpr double part = 0.5, noise = 1e-3, near = 0.01, apart = 4;
   if (!table.velocity.empty() || table.shift.empty()) return 0;
-  const auto velocity = [&](std::size_t k) {
-    const Vec3 v = (table.shift[k + 1] - table.shift[k]) / (table.t[k + 1] - table.t[k]);
-    return normal.isZero(0) ? v : Vec3(normal.dot(v) * normal);
+  const auto whole = [&](std::size_t k) {
+    return Vec3((table.shift[k + 1] - table.shift[k]) / (table.t[k + 1] - table.t[k]));
   };
-  double fastest = 0;
-  for (std::size_t k = 0; k + 1 < table.t.size(); ++k) fastest = std::max(fastest, velocity(k).norm());
+  const auto velocity = [&](std::size_t k) {
+    return normal.isZero(0) ? whole(k) : Vec3(normal.dot(whole(k)) * normal);
+  };
+  double least = 0;
+  for (std::size_t k = 0; k + 1 < table.t.size(); ++k)
+    least = std::max({least, part * velocity(k).norm(), noise * whole(k).norm()});
   for (std::size_t k = 1; k + 1 < table.t.size(); ++k) {
     if (std::min(table.t[k] - table.t[k - 1], table.t[k + 1] - table.t[k]) < apart * h) continue;
     const double phase = table.t[k] / h - 0.5;
-    if ((velocity(k) - velocity(k - 1)).norm() > part * fastest && std::abs(phase - std::round(phase)) > near)
+    if ((velocity(k) - velocity(k - 1)).norm() > least && std::abs(phase - std::round(phase)) > near)
       return k;
   }
   return 0;
 }
 
+/// The time step of all stages in which the motion may be, where grains rebound from the wall in each; else
+/// 0.
+double one_step_of_rebounds(std::span<const Stage> stages, const Wall& wall, const MotionPart& motion) {
+  const auto named = [&](const std::string& name) { return std::ranges::find(stages, name, &Stage::name); };
+  const auto begin = motion.from_stage.empty() ? stages.begin() : named(motion.from_stage);
+  const auto end = motion.until_stage.empty() ? stages.end() : named(motion.until_stage);
+  double h = 0;
+  for (auto stage = begin; stage < end; ++stage) {
+    double restitution = 0;
+    for (Material m = 0; stage->laws.knows(m); ++m)
+      restitution = std::max(restitution, stage->laws.between(m, wall.material).restitution);
+    if (restitution == 0 || stage->time_step == 0 || (h > 0 && stage->time_step != h)) return 0;
+    h = stage->time_step;
+  }
+  return h;
+}
+
 void add_jumps(const io::Scene& scene, std::vector<std::string>& warnings) {
-  const std::vector<Stage>& stages = scene.setup.stages;
   std::set<std::string> told;  // files
   for (const Wall& wall : scene.setup.walls)
     for (const MotionPart& motion : wall.motion) {
       if (!motion.table || motion.surface_only || told.contains(motion.file)) continue;
-      // The first stage of its motion in which grains rebound; begins of stages are ends of steps.
-      auto stage = motion.from_stage.empty() ? stages.begin()
-                                             : std::ranges::find(stages, motion.from_stage, &Stage::name);
-      stage = std::find_if(stage, stages.end(), [](const Stage& of) {
-        return of.time_step > 0 && of.laws.largest(&PairLaw::restitution) > 0;
-      });
-      if (stage == stages.end()) continue;
-      const double h = stage->time_step;
+      const double h = one_step_of_rebounds(scene.setup.stages, wall, motion);
+      if (h == 0) continue;
       const Vec3 normal = wall.surface() == nullptr ? wall.normal : Vec3(Vec3::Zero());
       const std::size_t row = split_jump(*motion.table, normal, h);
       if (row == 0) continue;

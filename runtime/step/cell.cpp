@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "kernels/fields/lucy.hpp"
@@ -75,13 +76,16 @@ void validate_stress(const Setup& setup, const Stage& stage) {
       refuse(fmt::format("amplitude_{0} swings about {0}, which is not given", names[k]));
   }
   if (swings && !(load.period > 0)) refuse("swings need a period > 0 [s]");
-  const double step = stage.chooses_time_step ? 0 : stage.time_step;
+  const bool chosen = stage.chooses_time_step;
+  const double longest =
+                   stage.time_step_max > 0 ? stage.time_step_max : std::numeric_limits<double>::infinity(),
+               step = chosen ? longest : stage.time_step;
   constexpr double steps = 4;  // in which a swing still has its amplitude
   if (swings && load.period < steps * step)
-    refuse(
-        fmt::format("swings of a period of {} s are not seen in steps of {} s; make time_step a quarter "
-                    "of the period at most",
-                    load.period, step));
+    refuse(fmt::format(
+        "swings of a period of {} s are not seen in steps of up to {} s; make {} a quarter of the "
+        "period at most",
+        load.period, step, chosen ? "time_step_max" : "time_step"));
   if (!(load.ramp_time >= 0 && std::isfinite(load.ramp_time))) refuse("ramp_time must be a number >= 0 [s]");
 }
 
@@ -118,6 +122,9 @@ std::string fault_in_cell(const Setup& setup, const Region& region) {
   const bool moves = any_stress(setup) || std::ranges::any_of(setup.stages, &Stage::flows);
   if (moves) return "is a surface, and the edges of the cell move: what goes through it is not counted there";
   const bool across = ((region.normal.array() != 0) && (edges.array() > 0)).any();
+  if (region.kind == Region::Kind::plane && across)
+    if (const std::string fault = too_wide(setup.domain, {region.point, region.point}); !fault.empty())
+      return fault;
   if (region.kind == Region::Kind::plane && across && (region.normal.array() != 0).count() > 1)
     return "is a plane; in a cell its normal has to lie along x, y or z";
   return region.kind == Region::Kind::disc ? too_wide(setup.domain, bounds_of(region)) : "";

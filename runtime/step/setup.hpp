@@ -77,11 +77,10 @@ struct StressLoad {
   bool any() const {
     return std::ranges::any_of(to, [](const auto& component) { return component.has_value(); });
   }
-  /// A face of the cell is pushed or pulled, at times: a normal component aims at something, swings about it,
-  /// or comes from it in a ramp.
+  /// A face of the cell is pushed or pulled: a normal component aims at something, or swings about 0.
   bool presses() const {
     for (std::size_t k = 0; k < 3; ++k)
-      if (to[k] && (*to[k] != 0 || amplitude[k] != 0 || ramp_time > 0)) return true;
+      if (to[k] && (*to[k] != 0 || amplitude[k] != 0)) return true;
     return false;
   }
 };

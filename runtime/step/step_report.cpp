@@ -44,10 +44,14 @@ double distance_from_equilibrium(const StepOutcome& outcome, const std::optional
     net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
                             std::abs(applied));
   }
+  // Of a cell against its own push, or a tenth of the largest where it aims at little; shears against the
+  // largest.
+  constexpr double little = 0.1;
   double largest = 0;
   for (const double push : state.cell.push) largest = std::max(largest, std::abs(push));
   for (std::size_t k = 0; k < cell_freedoms; ++k)
-    if (const double unit = k < 3 ? std::abs(state.cell.push[k]) : largest; state.cell.follows[k] && unit > 0)
+    if (const double unit = k < 3 ? std::max(std::abs(state.cell.push[k]), little * largest) : largest;
+        state.cell.follows[k] && unit > 0)
       net = std::max(net, std::abs(state.cell.impulse[k] + state.cell.push[k]) / unit);
   const double translation = against_flow ? 0.5 * against_flow->trace() : sums.motion.energy.translation;
   const double energy = translation + sums.motion.energy.rotation;
@@ -90,7 +94,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
   impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * sample.total_mass));
   // Nor what it leaves of pulls and pushes that cancel.
-  impulse_unit = std::max(impulse_unit, 1e-9 * cohesive_impulse(outcome));
+  impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(sample.bodies) * cohesive_impulse(outcome));
   const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
   report.step = step.number;
   report.time += parameters.time_step;
