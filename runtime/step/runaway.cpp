@@ -59,8 +59,8 @@ void check_strain(const StepState& state, double time_step, double most, const S
   if (strain <= most) return;
   throw RunawayError(fmt::format(
       "{}: the stress strains the cell by {:.3g} in a step, more than {}. Reduce the time step, raise "
-      "cell.inertia, or ask for a stress that the grains can bear: no more shear than friction "
-      "holds, no more tension than cohesion does",
+      "cell.inertia, or ask for a stress that the grains can bear: no more shear stress than "
+      "friction holds, no more tension than cohesion does",
       step.text(), strain, most));
 }
 
