@@ -161,8 +161,7 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
       tally.small > 0.5 * tally.lately)
     terminal.say(
         "direct solves of small clusters, which show how far their velocities and forces are off, took "
-        "{:.3g} "
-        "of the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
+        "{:.3g} of the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
         "(docs/certificate.md)",
         tally.small, tally.lately);
   if (tally.passed > 0)
@@ -195,9 +194,9 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
     terminal.warn(
         "warning: in {} walls close on grains that cannot get away, or a cell does, or rebounds between near "
         "walls: no velocities keep all contacts from approaching, so these steps have no solution and ended "
-        "early. Push walls with a force and cells with a stress instead of a velocity, slow them down, "
-        "remove "
-        "what overlaps there, or take restitution_law = \"moreau\" or a shorter time_step for such rebounds",
+        "early. Push walls with a force and cells with a stress instead of a velocity, slow them down, or "
+        "remove what overlaps there; for such rebounds take restitution_law = \"moreau\" or a shorter "
+        "time_step",
         counted(static_cast<std::size_t>(tally.jammed), "step"));
 }
 

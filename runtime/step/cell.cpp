@@ -107,27 +107,22 @@ std::string too_wide(const Domain& domain, const Bounds& box) {
 
 std::string fault_in_cell(const Setup& setup, const Region& region) {
   if (!setup.domain.repeats) return "";
-  const Vec3 edges = setup.domain.edges();
-  if (region.kind != Region::Kind::beyond && !region.is_surface())
-    return too_wide(setup.domain, bounds_of(region));
-  if (region.kind == Region::Kind::beyond) {
-    for (const Eigen::Index axis : {0, 1, 2})
-      if (edges[axis] > 0 && region.normal[axis] != 0)
-        return fmt::format(
-            "is all beyond a plane across {}, where the cell repeats: every grain has an image "
-            "there; give a box",
-            "xyz"[axis]);
-    return "";
+  const Eigen::Array<bool, 3, 1> repeats = setup.domain.edges().array() > 0,
+                                 along = region.normal.array() != 0;
+  const bool across = (repeats && along).any();  // of a plane
+  if (region.is_surface() && (any_stress(setup) || std::ranges::any_of(setup.stages, &Stage::flows)))
+    return "is a surface, and the edges of the cell move: what goes through it is not counted there";
+  switch (region.kind) {
+    case Region::Kind::beyond:
+      return across ? "is all beyond a plane across an axis along which the cell repeats: every grain has an "
+                      "image there; give a box"
+                    : "";
+    case Region::Kind::plane:
+      if (across && along.count() > 1) return "is a plane; in a cell its normal has to lie along x, y or z";
+      return across ? too_wide(setup.domain, {region.point, region.point}) : "";
+    default:
+      return too_wide(setup.domain, bounds_of(region));
   }
-  const bool moves = any_stress(setup) || std::ranges::any_of(setup.stages, &Stage::flows);
-  if (moves) return "is a surface, and the edges of the cell move: what goes through it is not counted there";
-  const bool across = ((region.normal.array() != 0) && (edges.array() > 0)).any();
-  if (region.kind == Region::Kind::plane && across)
-    if (const std::string fault = too_wide(setup.domain, {region.point, region.point}); !fault.empty())
-      return fault;
-  if (region.kind == Region::Kind::plane && across && (region.normal.array() != 0).count() > 1)
-    return "is a plane; in a cell its normal has to lie along x, y or z";
-  return region.kind == Region::Kind::disc ? too_wide(setup.domain, bounds_of(region)) : "";
 }
 
 std::string fault_in_cell(const Setup& setup, const FieldRule& field) {

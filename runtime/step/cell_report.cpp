@@ -89,8 +89,8 @@ Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::C
 }
 
 double stress_ratio(const Mat3& stress) {
-  const double p = stress.trace() / 3;
-  return p > 0 ? std::sqrt(1.5) * deviator(stress).norm() / p : 0;
+  const double q = std::sqrt(1.5) * deviator(stress).norm();
+  return q == 0 ? 0 : q / (stress.trace() / 3);
 }
 
 double inertial_time(const SampleSize& size, double p) {
@@ -109,10 +109,7 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.stage = outcome.step.stage;
   const PeriodicSpace& cell = state.domain.cell;
   out.edges = {cell.xx, cell.yy, cell.zz, cell.xy, cell.xz, cell.yz};
-  Mat3 edges = edges_of(state.domain);
-  for (const Eigen::Index axis : {0, 1, 2})
-    if (edges(axis, axis) == 0) edges(axis, axis) = 1;
-  const Mat3 gradient = matrix_of(state.domain.rates) * edges.inverse();
+  const Mat3 gradient = gradient_before(state.domain, 0);
   const Mat3 contact = outcome.sums.contacts.moment / (volume * outcome.parameters.impulse_time()),
              kinetic =
                  (report.kinetic_moment ? *report.kinetic_moment : kinetic_moment(state, gradient, ranks)) /
@@ -121,7 +118,7 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.kinetic_stress = symmetric(kinetic);
   out.p = contact.trace() / 3;
   out.q = std::sqrt(1.5) * deviator(contact).norm();
-  out.q_over_p = out.q == 0 ? 0 : out.q / out.p;
+  out.q_over_p = stress_ratio(contact);
   out.solid_fraction = report.solid_fraction;
   out.contacts_a_grain = 2 * static_cast<double>(report.active) /
                          static_cast<double>(std::max<std::int64_t>(1, outcome.sample.bodies));

@@ -12,7 +12,7 @@ namespace talus {
 /// Collective.
 Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks);
 
-/// q/p of a stress, or of anything in proportion to it: q = root of 3/2 s : s, s its deviator. 0 unless p >
+/// q/p of a stress, or of anything in proportion to it: q = root of 3/2 s : s, s its deviator. 0 where q is
 /// 0.
 double stress_ratio(const Mat3& stress);
 

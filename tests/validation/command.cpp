@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/unit/replaced.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::command_test {
@@ -283,6 +284,12 @@ TEST_F(Command, SaysWhatAStepOptionAskedForAndDidNotGet) {
   EXPECT_EQ(all.code, 0) << all.messages;
   EXPECT_FALSE(says(all, "the run ended after")) << all.messages;
   EXPECT_EQ(summary(at("results")).at("message"), "");
+
+  // Nor can a dump say what couples all contacts of a cell under a stress.
+  write(at("cell.toml"), replaced(cell_scene, "[[stage]]", "[[stage]]\nstress = { zz = 1e3 }"));
+  const Outcome cell = run("run cell.toml --force --out results --dump-fclib 1");
+  EXPECT_EQ(cell.code, 2) << cell.messages;
+  EXPECT_TRUE(says(cell, "the cell follows a stress")) << cell.messages;
 
   // A file that was asked for and is not there: whoever waits for it must hear of it.
   const Outcome none = run("run scene.toml --force --out results --dump-fclib 4 --dump-fclib 20");

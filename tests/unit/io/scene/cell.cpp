@@ -174,7 +174,7 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
   refuse(looks("shape = \"box\", low = [0, 0, 0], high = [1.7, 0.1, 0.1]"), "probe[0].region",
          "is more than 16 edges of the cell long along x");
   refuse(looks("shape = \"beyond\", point = [0, 0, 0.05], normal = [0, 0, 1]"), "probe[0].region",
-         "across z, where the cell repeats");
+         "across an axis along which the cell repeats");
   refuse(looks("shape = \"plane\", point = [0, 0, 0.05], normal = [0, 1, 1]"), "probe[0].region",
          "normal has to lie along x, y or z");
   refuse(replaced(looks("shape = \"plane\", point = [0, 0, 0.05], normal = [0, 0, 1]"), "[[stage]]",

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -15,12 +16,14 @@
 namespace talus::looks_in_cells_test {
 namespace {
 
+using simulation_test::cell_edge;
 using simulation_test::density;
+using simulation_test::flying;
 using simulation_test::loose_sample;
 using simulation_test::radius;
 using simulation_test::stage;
 
-constexpr double edge = 6 * 2.1 * radius;
+constexpr double edge = cell_edge;
 
 Region box(const Vec3& low, const Vec3& high) {
   Region region;
@@ -54,20 +57,6 @@ talus::Setup colliding(int subdomains, const Vec3& low, const Vec3& shears = Vec
                   {"right", box(low + edge * Vec3(0.3, 0, 0), low + Vec3::Constant(edge)), {}, 1}};
   setup.fields = {{"all", low, low + Vec3::Constant(edge), {12, 10, 15}, 1.3 * radius}};
   return setup;
-}
-
-Sample flying() {
-  const Bodies bodies = loose_sample(6, 6, 6, 11);
-  test::Random random(12);
-  Sample sample;
-  sample.density = density;
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    sample.x.push_back(bodies.x[k]);
-    sample.radius.push_back(bodies.radius[k]);
-    const Vec3 u = test::uniform_vector(random, -0.5, 0.5);
-    sample.velocity.push_back({u[0], u[1], u[2], 0, 0, 0});
-  }
-  return sample;
 }
 
 /// What the frame says of the whole cell.
@@ -186,6 +175,9 @@ TEST(LooksInCells, ImagesMoveWithTheFlow) {
   for (; !simulation.finished(); simulation.begin_next_stage()) simulation.step();
   const auto &here = simulation.probes().at(0), &above = simulation.probes().at(1);
   ASSERT_GT(here.count, 50);
+  // Nothing presses what is spread so thinly.
+  EXPECT_EQ(simulation.cell()->p, 0);
+  EXPECT_EQ(simulation.cell()->inertial_number, std::numeric_limits<double>::infinity());
   EXPECT_EQ(here.count, above.count);
   EXPECT_LT((above.velocity - here.velocity - Vec3(rate * edge, 0, 0)).norm(), 1e-12 * edge * rate);
   const FieldGrid field = simulation.frame().grids.at(0);

@@ -24,6 +24,24 @@ inline Bodies loose_sample(int edge_x, int edge_y, int edge_z, std::uint64_t see
   return bodies;
 }
 
+/// Edge of a cell that 6 x 6 x 6 of them fill [m].
+inline constexpr double cell_edge = 6 * 2.1 * radius;
+
+/// 216 of these grains that fly about, from places moved by `shift` [m].
+inline Sample flying(const Vec3& shift = Vec3::Zero()) {
+  const Bodies bodies = loose_sample(6, 6, 6, 11);
+  test::Random random(12);
+  Sample sample;
+  sample.density = density;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    sample.x.push_back(bodies.x[k] + shift);
+    sample.radius.push_back(bodies.radius[k]);
+    const Vec3 u = test::uniform_vector(random, -0.5, 0.5);
+    sample.velocity.push_back({u[0], u[1], u[2], 0, 0, 0});
+  }
+  return sample;
+}
+
 inline std::vector<Wall> box(double x, double y, double z) {
   std::vector<Wall> walls = test::box_of_walls(0, 0);
   walls[1].point = Vec3(x, 0, 0);

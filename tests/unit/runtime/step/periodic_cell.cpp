@@ -19,12 +19,13 @@
 namespace talus::periodic_cell_test {
 namespace {
 
+using simulation_test::cell_edge;
 using simulation_test::density;
-using simulation_test::loose_sample;
+using simulation_test::flying;
 using simulation_test::radius;
 using simulation_test::stage;
 
-constexpr double edge = 6 * 2.1 * radius;
+constexpr double edge = cell_edge;
 
 /// 216 grains that fly about in a cube and hit one another, with friction.
 Setup colliding(std::int64_t steps) {
@@ -37,20 +38,6 @@ Setup colliding(std::int64_t steps) {
   setup.solver.overlap_tolerance = 1;
   setup.decomposition.subdomains = 1;
   return setup;
-}
-
-Sample flying(const Vec3& shift = Vec3::Zero()) {
-  const Bodies bodies = loose_sample(6, 6, 6, 11);
-  test::Random random(12);
-  Sample sample;
-  sample.density = density;
-  for (std::size_t k = 0; k < bodies.size(); ++k) {
-    sample.x.push_back(bodies.x[k] + shift);
-    sample.radius.push_back(bodies.radius[k]);
-    const Vec3 u = test::uniform_vector(random, -0.5, 0.5);
-    sample.velocity.push_back({u[0], u[1], u[2], 0, 0, 0});
-  }
-  return sample;
 }
 
 /// State of each grain at the end, by its number, and what the steps said.

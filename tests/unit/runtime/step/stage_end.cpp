@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "runtime/step/cell_report.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
@@ -81,6 +82,13 @@ Simulation lattice(const StressLoad& load, const StageEnd& end, graph::Executor&
     add_sphere(bodies, BodyId{k}, radius * Vec3(2 * (k % 4) + 1, 2 * (k / 4 % 4) + 1, 2 * (k / 16) + 1),
                radius, density);
   return {setup, std::move(bodies), executor};
+}
+
+// Of tension the ratio is negative: a stage that waits for a shear does not end by a pull.
+TEST(StressRatio, HasTheSignOfThePressure) {
+  EXPECT_DOUBLE_EQ(stress_ratio(Vec3(1, 1, 4).asDiagonal()), 1.5);
+  EXPECT_DOUBLE_EQ(stress_ratio(Vec3(-1, -1, -4).asDiagonal()), -1.5);
+  EXPECT_EQ(stress_ratio(Mat3::Zero()), 0);
 }
 
 // q/p = (zz - 1)/((zz + 2)/3) of stresses (1, 1, zz) kPa, with zz from 1 to 4 kPa in 0.3 s, as a step's
