@@ -32,8 +32,8 @@ std::ptrdiff_t loops_of(const BodyProblem& problem) {
   std::vector<std::array<std::int32_t, 2>> pairs;
   for (const ContactEquation& c : problem.contacts)
     if (c.second >= 0) pairs.push_back({std::min(c.first, c.second), std::max(c.first, c.second)});
-  std::ranges::sort(pairs);
-  const auto pairs_end = std::ranges::unique(pairs).begin();
+  std::sort(pairs.begin(), pairs.end());
+  const auto pairs_end = std::unique(pairs.begin(), pairs.end());
   return pairs_end - pairs.begin() - static_cast<std::ptrdiff_t>(problem.bodies.size()) + 1;
 }
 
