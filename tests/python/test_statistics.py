@@ -101,3 +101,33 @@ def test_pairs_of_a_leaning_cell_are_those_of_all_images():
 def test_more_than_half_of_the_box_is_refused():
     with pytest.raises(ValueError, match="at most half"):
         talus.pair_correlation(lattice(3), [0] * 3, [3] * 3, 1.6)
+
+
+def lone_grain(velocity, **stage):
+    """A run of one grain in a periodic cell, which flies at a velocity; a frame each tenth of a second."""
+    return {
+        "name": "lone-grain", "time_step": 1e-2, "material": {"density": 2600}, "cell": {"lengths": [1.0, 0.8, 0.9]},
+        "sample": {"kind": "body", "name": "g", "radius": 0.05, "position": [0.3, 0.4, 0.5], "velocity": velocity},
+        "stage": [{"name": "fly", "end": {"time": 2.0}, **stage}], "output": {"every_steps": 10},
+    }
+
+
+def test_what_flies_through_the_faces_of_a_cell_has_moved_by_velocity_times_time(tmp_path):
+    velocity = np.array([2.0, -1.5, 0.7])
+    run = talus.run(lone_grain(velocity.tolist()), tmp_path / "out", threads=1, progress=False)
+    moved = talus.displacements(run.frames)
+    assert moved.shape == (21, 1, 3) and np.allclose(moved[:, 0], np.outer(run.frames.times, velocity), atol=1e-9)
+
+
+def test_what_follows_the_flow_of_a_cell_has_not_moved(tmp_path):
+    run = talus.run(lone_grain([0.0, 0.0, 0.0], shear_rates=[0.7, 1.5, -0.9]), tmp_path / "out", threads=1, progress=False)
+    leans = np.array([frame.cell[2, 0] for frame in run.frames])
+    assert np.abs(np.diff(leans)).max() > 0.5  # edges were replaced
+    assert np.abs(talus.displacements(run.frames)).max() < 1e-9
+
+
+def test_between_walls_grains_have_moved_by_differences_of_positions(heap_run):
+    moved = talus.displacements(heap_run.frames)
+    assert np.array_equal(moved[-1], heap_run.frame(-1).positions - heap_run.frame(0).positions)
+    with pytest.raises(ValueError, match="no frame"):
+        talus.displacements([])

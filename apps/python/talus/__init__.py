@@ -18,7 +18,7 @@ from .frame import Frame, MissingData
 from .parameter_sweep import Sweep, sweep
 from .results import DamagedFile, NotARun, Run, open_run
 from .scene import Scene, SceneError
-from .statistics import anisotropy, fabric_tensor, force_distribution, pair_correlation
+from .statistics import anisotropy, displacements, fabric_tensor, force_distribution, pair_correlation
 from .tables import read_table
 
 open = open_run  # `talus.open`; inside this package the name would hide the built-in
@@ -26,6 +26,6 @@ open = open_run  # `talus.open`; inside this package the name would hide the bui
 __version__ = "0.1.0"
 __all__ = [
     "DamagedFile", "Frame", "MissingData", "NotARun", "Run", "RunError", "Scene", "SceneError", "Stopped", "Sweep",
-    "anisotropy", "fabric_tensor", "find_program", "force_distribution", "open", "open_run",
+    "anisotropy", "displacements", "fabric_tensor", "find_program", "force_distribution", "open", "open_run",
     "pair_correlation", "read_table", "run", "sweep",
 ]

@@ -1,12 +1,14 @@
-"""Statistics of packings: fabric, forces, distances. Functions of arrays; a `Frame` has these as attributes."""
+"""Statistics of packings: fabric, forces, distances, motion. Functions of arrays, which a `Frame` has as attributes."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from .frame import Frame, MissingData
 
 
 def fabric_tensor(normals: ArrayLike) -> np.ndarray:
@@ -95,6 +97,54 @@ def pair_correlation(
     density = len(x) / size.prod()
     with np.errstate(invalid="ignore", divide="ignore"):
         return 0.5 * (edges[1:] + edges[:-1]), counts / (inner.sum() * density * shells)
+
+
+def displacements(frames: Sequence[Frame]) -> np.ndarray:
+    """How far the grains of the first frame have moved until each frame [m], shape (frames, n, 3), in order of its ids.
+
+    In a periodic cell against its flow: from one frame to the next a grain that stays where it is in the cell has moved
+    by nothing, and what the others have moved adds up, through any face. So `(d**2).mean(axis=1)` is the mean square
+    displacement. Two frames that follow one another have to be so near in time that no grain moves by half of an edge
+    against the flow, nor the cell by a shear of half. Raises MissingData where a frame lacks one of the grains, and
+    ValueError without a frame.
+    """
+    if len(frames) == 0:
+        raise ValueError("the displacement from no frame is not defined")
+    ids = frames[0].ids
+    moved = np.zeros((len(frames), len(ids), 3))
+    before, then = frames[0], frames[0].positions
+    for k in range(1, len(frames)):
+        now = frames[k]
+        there = now.positions[now.rows(ids)]
+        moved[k] = moved[k - 1] + _moved(before, then, now, there)
+        before, then = now, there
+    return moved
+
+
+def _moved(before: Frame, then: np.ndarray, now: Frame, there: np.ndarray) -> np.ndarray:
+    """From positions `then` to those `there` [m], against the flow of the cell where there is one."""
+    try:
+        edges = before.cell
+    except MissingData:
+        return there - then
+    carried = (then - before.cell_origin) @ np.linalg.inv(_filled(edges)) @ _filled(_edges_carried(before, now))
+    return now.nearest(there - now.cell_origin - carried)
+
+
+def _edges_carried(before: Frame, now: Frame) -> np.ndarray:
+    """The edges of the cell now [m] as the flow has carried those before: an edge that leaned by half of another was
+    replaced since."""
+    edges = now.cell.copy()
+    flown = before.cell + (now.time - before.time) * before.cell_rates
+    for of, by in ((2, 1), (2, 0), (1, 0)):
+        if edges[by, by] > 0:
+            edges[of] += np.rint((flown[of, by] - edges[of, by]) / edges[by, by]) * edges[by]
+    return edges
+
+
+def _filled(edges: np.ndarray) -> np.ndarray:
+    """With 1 m along axes of walls, where nothing flows."""
+    return edges + np.diag(np.where(np.diag(edges) == 0, 1.0, 0.0))
 
 
 def _near_pairs(
