@@ -63,14 +63,14 @@ struct Prepared {
   Recordings recordings;
   std::vector<io::InputFile> input_files;  ///< rank 0's
   std::vector<std::string> warnings;
-  std::optional<std::size_t> bodies;  ///< that a run which goes on began with, where that is known
   std::string directory;
   std::string resolved;  ///< the scene as it was loaded
   double wall_mass = 0;
   std::optional<double> granted;
   std::optional<io::DirectoryLock> lock;  ///< of a run that goes on: rank 0's, from before it reads
   std::optional<ResumePoint> point;
-  std::optional<int> nothing_left;  ///< exit code of the run that has been done
+  std::optional<int> nothing_left;     ///< exit code of the run that has been done
+  std::optional<std::int64_t> enough;  ///< its last step, where --steps asks for no more
 };
 
 void check_options(const RunOptions& options, const graph::Communicator& ranks) {
@@ -115,17 +115,22 @@ void place_sample(Prepared& run) {
 }
 
 /// Where the run goes on, if it does. Collective, but for what it throws.
-void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& terminal, Prepared& run) {
+void look_for_checkpoint(const RunOptions& options, const graph::Communicator& ranks,
+                         const Terminal& terminal, Prepared& run) {
   run.point = find_resume_point(run.directory, run.scene, ranks, terminal);
   const EarlierRun earlier = earlier_run(run.directory);
   if (run.point) {
     compare_scenes(run.scene, run.resolved, *run.point);
     if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
+    const std::int64_t step = run.point->file.state.head.report.step;
+    if (options.steps && step >= *options.steps) {
+      run.nothing_left = earlier.exit_code;
+      run.enough = step;
+    }
     if (ranks.rank() == 0 && !run.nothing_left)
       demand_files_of_run(run.directory, run.scene.output, run.point->memory.mark);
     take_over(*run.point, run.scene);
     run.warnings = earlier.warnings;
-    run.bodies = earlier.bodies;
   } else if (earlier.complete) {
     run.nothing_left = earlier.exit_code;
   }
@@ -173,7 +178,7 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
       run.lock.emplace(run.directory);
   });
   if (!loaded) return false;
-  if (options.resume && !agreed([&] { look_for_checkpoint(ranks, terminal, run); })) return false;
+  if (options.resume && !agreed([&] { look_for_checkpoint(options, ranks, terminal, run); })) return false;
   return agreed([&] {
     if (ranks.rank() != 0) return;
     for (const std::string& file : io::input_files(run.scene))
@@ -274,7 +279,7 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
                              ranks,        terminal,      run.point ? &*run.point : nullptr,
                              run.resolved, run.wall_mass, began,
                              run.granted,  run.directory, provenance,
-                             run.warnings, run.bodies};
+                             run.warnings};
   const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
   if (ranks.rank() == 0) {
     print_end(terminal, summary, scene.setup.solver, run.directory);
@@ -295,7 +300,10 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   if (!prepare(options, ranks, terminal, run)) return exit_bad_input;
   if (options.dry_run) return exit_done;
   if (run.nothing_left) {
-    if (ranks.rank() == 0)
+    if (ranks.rank() == 0 && run.enough)
+      terminal.say("the run in {} has made {} steps, and --steps {} asks for no more; nothing was written",
+                   run.directory, *run.enough, *options.steps);
+    else if (ranks.rank() == 0)
       terminal.say("the run in {} is done; to go on beyond its end, give its stage another one with --set",
                    run.directory);
     return *run.nothing_left;

@@ -18,6 +18,7 @@
 #include "io/files/crc.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
+#include "io/results/results.hpp"
 #include "io/results/run_json.hpp"
 #include "runtime/step/decomposition.hpp"
 
@@ -150,6 +151,8 @@ void demand_files_of_run(const std::filesystem::path& directory, const io::Outpu
     if (io::crc_of_file(path, known.bytes) != known.crc)
       refuse(fmt::format("the run wrote {} bytes until the checkpoint, and these are others", known.bytes));
   }
+  if (mark.frame_times.empty() || !goes_on("results.h5", output)) return;
+  io::demand_kept_frames(directory / "results.h5", mark.frame_times.size());
 }
 
 void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
@@ -203,8 +206,6 @@ EarlierRun earlier_run(const std::filesystem::path& directory) {
   if (const auto warnings = summary.find("warnings"); warnings != summary.end() && warnings->is_array())
     for (const nlohmann::json& warning : *warnings)
       if (warning.is_string()) run.warnings.push_back(warning.get<std::string>());
-  if (const auto bodies = summary.find("bodies"); bodies != summary.end() && bodies->is_number_unsigned())
-    run.bodies = bodies->get<std::size_t>();
   return run;
 }
 

@@ -52,7 +52,6 @@ struct EarlierRun {
   bool complete = false;  ///< the last stage of the scene has ended
   int exit_code = 0;
   std::vector<std::string> warnings;  ///< of the scene
-  std::optional<std::size_t> bodies;  ///< that the run began with
 };
 EarlierRun earlier_run(const std::filesystem::path& directory);
 

@@ -286,10 +286,7 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
   const Tally& tally = all.memory.tally;
   tally.sum_up(simulation.report(), summary);
   summary.wall_s = memory.wall_s;
-  auto bodies = static_cast<std::int64_t>(summary.bodies);
-  for (const InsertReport& insert : simulation.inserted()) bodies += insert.placed;
-  for (const RemoveReport& remove : simulation.removed()) bodies -= remove.count;
-  summary.bodies_at_end = static_cast<std::size_t>(bodies);
+  summary.bodies_at_end = static_cast<std::size_t>(simulation.bodies());
   // The other ranks may wait for what will not come: the caller ends them when the files are whole.
   if (summary.status == "failed") return;
   if (trace) trace->finish(executor);
@@ -304,6 +301,14 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
   summary.digest = simulation.digest();
 }
 
+/// With how many grains the run began: those that are there, without those that came, with those that went.
+std::size_t first_bodies(const CheckpointHead& head) {
+  std::int64_t bodies = head.size.bodies;
+  for (const std::int64_t placed : head.population.placed) bodies -= placed;
+  for (const std::int64_t removed : head.population.removed) bodies += removed;
+  return static_cast<std::size_t>(bodies);
+}
+
 /// Of the heaviest grains, in the strongest gravity of a stage [N/m^3].
 double grain_weight(const io::Scene& scene) {
   double density = scene.density, gravity = 0;
@@ -316,9 +321,7 @@ double grain_weight(const io::Scene& scene) {
 
 io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces) {
   io::Summary summary;
-  summary.bodies =
-      !run.resume ? sample.size()
-                  : run.bodies.value_or(static_cast<std::size_t>(run.resume->file.state.head.size.bodies));
+  summary.bodies = run.resume ? first_bodies(run.resume->file.state.head) : sample.size();
   summary.warnings = run.warnings;
   // Of one rank it writes on the background thread, from where a trace must hear of no call.
   io::OutputContext context = io::output_context(run.directory, run.scene.setup,

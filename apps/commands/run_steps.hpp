@@ -38,7 +38,6 @@ struct PreparedRun {
   std::string directory;                   ///< of the results
   io::Provenance provenance;               ///< with the number of threads
   std::vector<std::string> warnings = {};  ///< of the scene; rank 0's
-  std::optional<std::size_t> bodies = {};  ///< that a run which goes on began with, where that is known
 };
 
 /// Collective. Runs from the first file of the results to the last; rank 0 has the sample, and the forces

@@ -58,10 +58,6 @@ class Problem {
  public:
   Problem(const StudySample& sample, const StudyPlan& plan, int threads)
       : plan_(plan), setup_(sample.scene.setup) {
-    for (std::size_t k = 0; k < sample.bodies.size(); ++k) {
-      mass_[static_cast<std::int64_t>(sample.bodies.id[k])] = sample.bodies.mass(k);
-      total_mass_ += sample.bodies.mass(k);
-    }
     Setup alone = setup_;
     alone.decomposition = with_subdomains(alone.decomposition, 1);
     graph::Executor executor({.threads = threads});
@@ -76,6 +72,14 @@ class Problem {
           "smaller --at-step",
           sample.scene.source_file, simulation.report().step, plan.at_step));
     saved_ = simulation.save();
+    // The step is solved without the grains that come and go with it.
+    setup_.inserts.clear();
+    setup_.removes.clear();
+    saved_.population = {};
+    for (std::size_t k = 0; k < saved_.bodies.size(); ++k) {
+      mass_[static_cast<std::int64_t>(saved_.bodies.id[k])] = saved_.bodies.mass(k);
+      total_mass_ += saved_.bodies.mass(k);
+    }
     before_ = simulation.frame(false);
     gravity_ = simulation.parameters().gravity;
     setup_.solver = at_tolerance(setup_.solver, plan.tolerances.back());

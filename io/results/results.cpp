@@ -104,6 +104,16 @@ class OpenFrame {
   std::optional<Hdf5Object> group_;
 };
 
+/// Names of the frames, of which there have to be so many.
+std::vector<std::string> frames_of(const Place& root, std::size_t kept) {
+  std::vector<std::string> names = detail::names_in(root, "frames");
+  if (names.size() < kept)
+    throw FileError(root.file, fmt::format("has {} frames, of {} that the checkpoint knows; begin anew in "
+                                           "another directory",
+                                           names.size(), kept));
+  return names;
+}
+
 /// Removes the frames behind the first `kept`. Their room in the file is taken by those that follow, or
 /// given back, as far as they were its last.
 void cut_opened(const std::string& path, std::size_t kept) {
@@ -112,11 +122,7 @@ void cut_opened(const std::string& path, std::size_t kept) {
       hold(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path, "opening the file");
   {
     const Place root{file.id(), path};
-    std::vector<std::string> names = detail::names_in(root, "frames");
-    if (names.size() < kept)
-      throw FileError(path, fmt::format("has {} frames, of {} that the checkpoint knows; begin anew in "
-                                        "another directory",
-                                        names.size(), kept));
+    std::vector<std::string> names = frames_of(root, kept);
     for (; names.size() > kept; names.pop_back())
       demand(H5Ldelete(file.id(), ("/frames/" + names.back()).c_str(), H5P_DEFAULT), path,
              "removing frame " + names.back());
@@ -124,18 +130,39 @@ void cut_opened(const std::string& path, std::size_t kept) {
   close_file(file, path);
 }
 
+constexpr const char* instead_of_frames =
+    "begin anew in another directory, from the last checkpoint with [sample] kind = \"state\"";
+
 void cut_frames(const std::string& path, std::size_t kept) {
   const detail::QuietHdf5 quiet;
   detail::bring_back_directory(path);
   detail::keep_directory(path);
   const auto cut = [&] { cut_opened(path, kept); };
-  constexpr const char* remedy =
-      "begin anew in another directory, from the last checkpoint with [sample] kind = \"state\"";
-  if (!detail::done_in_a_child(path, remedy, cut)) cut();
+  if (!detail::done_in_a_child(path, instead_of_frames, cut)) cut();
   detail::drop_directory(path);
 }
 
+/// Goes through the directories of all frames, and throws for what is no HDF5 there, too.
+void look_through(const std::string& path, std::size_t kept) {
+  const Hdf5Object access = file_access(path);
+  const Hdf5Object file =
+      hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening the file");
+  const Place root{file.id(), path};
+  const std::vector<std::string> names = frames_of(root, kept);
+  for (const std::string& name : names)
+    for (const std::string& group : detail::names_in(root, "frames/" + name))
+      detail::names_in(root, "frames/" + name + "/" + group);
+}
+
 }  // namespace
+
+void demand_kept_frames(const std::filesystem::path& path, std::size_t kept) {
+  const std::string name = path.string();
+  const detail::QuietHdf5 quiet;
+  detail::bring_back_directory(name);
+  const auto look = [&] { look_through(name, kept); };
+  if (!detail::done_in_a_child(name, instead_of_frames, look)) look();
+}
 
 ResultsWriter::ResultsWriter(const std::filesystem::path& path, const ResultsNames& names)
     : ResultsWriter(path, names, graph::one_rank()) {}

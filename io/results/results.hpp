@@ -98,6 +98,10 @@ class ResultsWriter {
   std::size_t frames_ = 0;
 };
 
+/// Throws FileError unless a results.h5 that a run goes on with, whose directory is brought back first, holds
+/// the first `kept` frames, and the directories of all its frames can be read.
+void demand_kept_frames(const std::filesystem::path& path, std::size_t kept);
+
 /// Whether its bodies are clumps, of whose shapes frames have the bounding spheres only; files of
 /// earlier versions do not tell. Throws FileError when it is no results.h5.
 bool holds_clumps(const std::filesystem::path& path);

@@ -158,17 +158,6 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
   detail::close_groups(chunks, chunk, place, contacts);
 }
 
-/// True when a body that has moved to `x` by `way`, relative to the wall, was deep in a surface on that way:
-/// such a step is too long, and the body may have passed a thin surface.
-bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius) {
-  if (!detail::came_far(way, radius)) return false;
-  std::vector<SurfacePoint> points;
-  constexpr double most = 256;  // looks: a body that came further is found by its energy
-  const double looks = std::ceil(std::min(most, 4 * way.norm() / radius));
-  for (double look = 0; look < looks; ++look) collide(wall, x - look / looks * way, 0.5 * radius, points);
-  return !points.empty();
-}
-
 /// Finds the contacts of a chunk at a surface. The chunk has each grain once, with one feature that it may
 /// touch.
 void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
@@ -190,7 +179,7 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     collide(of, in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
-    through += passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
+    through += detail::passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
     const PairLaw& law = law_of(phase, pair);
     const GapResult<double> found =
         solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),

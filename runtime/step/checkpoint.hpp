@@ -138,7 +138,7 @@ struct CheckpointHead {
   std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   bool over = false;
   double sheared = 0;
-  double held = 0;
+  double held = 0, falls_in = 0;
   StageMemory memory;
   double time_step = 0;
   double impulse_time = 0;  ///< of the last step [s]: forces are impulses over it
@@ -209,6 +209,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("over", head.over);
   visit("sheared", head.sheared);
   visit("held", head.held);
+  visit("falls_in", head.falls_in);
   StageMemory::each_number(head.memory, visit);
   visit("time_step", head.time_step);
   visit("impulse_time", head.impulse_time);

@@ -55,7 +55,8 @@ SavedState Simulation::save() const {
           impl_->population.state(),
           impl_->state.domain,
           impl_->state.flow,
-          impl_->memory};
+          impl_->memory,
+          impl_->falls_in};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {

@@ -40,6 +40,7 @@ struct SavedState {
   Domain domain = {};
   CellFlow flow = {};
   StageMemory memory = {};
+  double falls_in = 0;  ///< fall_time of the last step where `held` is not 0 [s]
 };
 
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time

@@ -61,6 +61,13 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[at(pair.body)]);
   meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity_at(touch.point);
   meeting.fall = in.time_step * in.gravity - wall.gain;
+  if (wall.surface() != nullptr) {
+    // Behind a thin surface, and in a solid, the point where the ball is near it now tells nothing.
+    const Mat3 to_ball = lever_of(in, pair.body, touch.ball.centre - in.x[at(pair.body)]);
+    const Vec3 v = velocity_at(in, pair.body, to_ball) - wall.velocity_at(touch.ball.centre);
+    meeting.passed = passed_surface(wall, touch.ball.centre, in.time_step * v, touch.ball.radius);
+    return meeting;
+  }
   // The wall counts as the surface of a body as large as the ball.
   const double way = in.time_step * touch.normal.dot(meeting.v);
   meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.smaller_radius;

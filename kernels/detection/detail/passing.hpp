@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus::detail {
 
@@ -31,5 +32,10 @@ inline bool passed(const Vec3& d, const Vec3& way, double touching, double small
   const double overlap = touching - (start + nearest * way).norm();
   return overlap - std::max(0.0, touching - start.norm()) > (coming ? deep_coming : deep) * small;
 }
+
+/// True when a ball that has moved to `x` by `way`, relative to the wall, was deep in a surface on that way:
+/// such a step is too long, and the ball may have passed a thin surface, or into a solid, from where no
+/// contact leads out.
+bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius);
 
 }  // namespace talus::detail

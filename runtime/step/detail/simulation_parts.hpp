@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 #include "kernels/detection/domain.hpp"
+#include "runtime/step/appearing_walls.hpp"
 #include "runtime/step/cell.hpp"
 #include "runtime/step/cell_loads.hpp"
 #include "runtime/step/cell_report.hpp"
@@ -78,6 +79,7 @@ struct Simulation::Implementation {
     stage_steps = from.steps_of_stage;
     clock = from.clock;
     held = from.held;
+    falls_in = from.falls_in;
     sheared = from.sheared;
     memory = from.memory;
     population.go_on_from(from.population);
@@ -107,6 +109,7 @@ struct Simulation::Implementation {
     if (stage().chooses_time_step) clock.move_end(stage().end.time);
     stage_steps = head.stage_steps;
     held = head.held;
+    falls_in = head.falls_in;
     sheared = head.sheared;
     memory = head.memory;
     lengths_at_start = head.lengths_at_start;
@@ -137,6 +140,7 @@ struct Simulation::Implementation {
     head.stage_begins = stage_begins;
     head.over = over;
     head.held = held;
+    head.falls_in = falls_in;
     head.sheared = sheared;
     head.memory = memory;
     head.time_step = parameters.time_step;
@@ -227,7 +231,7 @@ struct Simulation::Implementation {
       state.candidates_valid = false;
     }
     stage_steps = 0;
-    held = sheared = 0;
+    held = falls_in = sheared = 0;
     memory = {};
     lengths_at_start = state.domain.lengths(state.walls);
   }
@@ -240,6 +244,7 @@ struct Simulation::Implementation {
 
   void choose_time_step() {
     set_walls(setup, report.time, parameters.time_step, state);
+    if (stage_steps == 0) demand_grains_outside(stage(), next_step().text(), state, ranks);
     if (!stage().chooses_time_step) return;
     prepare_walls(report.time, parameters.time_step, state, ranks);
     double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
@@ -294,6 +299,7 @@ struct Simulation::Implementation {
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
     const StepSpan last{report.time - report.time_step, report.time, &stage(), stage_begins[stage_index]};
     if (held > 0 && population.expects_grains(last)) held = 0;
+    falls_in = held > 0 ? fall_time(outcome()) : 0;
   }
 
   void probe() {
@@ -327,7 +333,7 @@ struct Simulation::Implementation {
   StageDone done() const {
     const StageEnd& end = stage().end;
     return stage_done(stage(), {stage_steps, clock, end.strain ? strain(end.strain_axis) : 0, sheared, held,
-                                held > 0 ? fall_time(outcome()) : 0, memory});
+                                falls_in, memory});
   }
 
   void pass_ended_stages() {
@@ -354,6 +360,8 @@ struct Simulation::Implementation {
   StageClock clock;    ///< of a stage that chooses its time steps
   double sheared = 0;  ///< path of the cell's shear since the stage began
   double held = 0;     ///< time for which the stage's bound on equilibrium has held [s]
+  double falls_in =
+      0;  ///< where it has: fall_time of the last step, whose loads a resumed run has yet to find [s]
   StageMemory memory;  ///< of ends that look back
   std::size_t stage_index = 0;
   std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]

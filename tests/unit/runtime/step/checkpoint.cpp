@@ -186,6 +186,39 @@ TEST(Checkpoints, KnowWhatAVelocityCheckHasFound) {
   EXPECT_EQ(resumed.digest, whole.digest);
 }
 
+// A stage ends when equilibrium has held for so many times that a grain needs to fall by its diameter under
+// the load, which a resumed run knows only when it has made a step.
+TEST(Checkpoints, KnowForHowLongEquilibriumHasToHold) {
+  talus::Setup in_cell;
+  in_cell.domain = periodic_domain({6.3, 6.3, 6.3}, Vec3::Constant(-0.6));
+  in_cell.decomposition.coupling = Coupling::nscdd;
+  in_cell.solver.max_iterations = 20;
+  Stage press;
+  press.name = "press";
+  press.time_step = 0.01;
+  press.laws = laws_of_one_material(0.3, 0.3, 0);
+  press.stress.to = {1e3, 1e3, 1e3, {}, {}, {}};
+  in_cell.stages = {press};
+  talus::Setup in_box = pressed(2);
+  in_box.stages.pop_back();
+  in_box.stages[0].end.steps.reset();
+  for (talus::Setup* setup : {&in_cell, &in_box}) {
+    StageEnd& end = setup->stages[0].end;
+    end.equilibrium = 1e9;
+    // A grain falls in about 2 s in the cell, and in 0.6 s in the box.
+    end.equilibrium_hold = 8.5 * setup->stages[0].time_step / (setup == &in_cell ? 2 : 0.6);
+    const Outcome straight = run(*setup, 1, 1, std::nullopt);
+    const auto steps = static_cast<int>(straight.reports.size() / 2);
+    ASSERT_GT(steps, 3);
+    ASSERT_LT(steps, 30);
+    for (int stop = 1; stop < steps; ++stop) {
+      const Outcome stopped = run(*setup, 1, 1, stop), resumed = run(*setup, 1, 1, {}, &stopped.whole);
+      EXPECT_EQ(stopped.reports.size() + resumed.reports.size(), straight.reports.size()) << stop;
+      EXPECT_EQ(resumed.digest, straight.digest) << stop;
+    }
+  }
+}
+
 TEST(Checkpoints, ColumnsMatterToTheDigest) {
   talus::Setup setup = pressed(4);
   setup.solver.overlap_correction = 0.3;

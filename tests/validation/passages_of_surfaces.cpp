@@ -1,0 +1,94 @@
+/// Bodies that get behind thin surfaces, or into solids, where no contact brings them back: a step that lets
+/// them is told, whatever the body and the surface, and so is a stage.
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "runtime/step/runaway.hpp"
+#include "tests/unit/mesh_makers.hpp"
+#include "tests/validation/clump_scenes.hpp"
+
+namespace talus::validation::passages_of_surfaces_test {
+namespace {
+
+/// A body at rest at the origin, its lowest point at z = -r, and a surface 0.5 m below that moves upwards: of
+/// no thickness, or of a tenth of r.
+Experiment sweep(const std::string& shape, bool clump, double speed, double begin) {
+  ClumpScene scene(h);
+  if (!clump) scene.setup.clumps.clear();
+  const double z = -0.5 - begin;
+  if (shape == "rectangle")
+    scene.surface(shape, {{"corner", {-1, -1, z}}, {"edge_a", {2, 0, 0}}, {"edge_b", {0, 2, 0}}});
+  else if (shape == "disc")
+    scene.surface(shape, {{"centre", {0, 0, z}}, {"axis", {0, 0, 1}}, {"radius", {1}}});
+  else
+    scene.surface(shape, {}, test::box_mesh({-1, -1, z - 0.1 * r}, {1, 1, z}, 2));
+  scene.setup.walls.back().motion = {MotionPart{.velocity = {0, 0, speed}}};
+  scene.stage().laws.set_all(&PairLaw::restitution, 0.5);  // what bounces is not held before it touches
+  if (clump)
+    scene.dumbbell(Vec3::Zero(), about(Vec3::UnitY(), 0.3));
+  else
+    scene.sphere(Vec3::Zero(), r, mass);
+  return Experiment(std::move(scene));
+}
+
+TEST(Surfaces, ThatSweepPastABodyWithoutTouchingItAreTold) {
+  int missed = 0;
+  for (const std::string shape : {"rectangle", "disc", "mesh"})
+    for (const bool clump : {false, true})
+      for (const double far : {2.5, 5.0, 40.0, 1500.0})
+        for (int cut = 0; cut < 4; ++cut) {
+          const double speed = far * r / h;
+          Experiment run = sweep(shape, clump, speed, 0.25 * cut * far * r);
+          std::int64_t passed = 0;
+          while (run.time() * speed < 0.5 + far * r * (2 + 0.25 * cut)) passed += run.step().passed;
+          if (run.u() != Vec3::Zero()) continue;
+          ++missed;
+          EXPECT_GT(passed, 0) << shape << (clump ? ", dumbbell, " : ", sphere, ") << far << ", " << cut;
+        }
+  EXPECT_GT(missed, 50) << "else nothing is looked at here";
+}
+
+/// A surface that appears in the second stage, where a dumbbell is, and a sphere.
+Experiment appear(const std::string& shape, ShapeNumbers numbers, std::vector<Triangle> triangles) {
+  ClumpScene scene(h);
+  scene.surface(shape, std::move(numbers), std::move(triangles));
+  scene.setup.walls.back().from_stage = "second";
+  scene.stage().end.steps = 2;
+  scene.setup.stages.push_back(scene.stage());
+  scene.setup.stages.back().name = "second";
+  scene.dumbbell(Vec3(0, 0, 1));
+  scene.sphere(Vec3::Zero(), r, mass);
+  return Experiment(std::move(scene));
+}
+
+/// Steps of both stages; the message of what ends them.
+std::string ended_by(Experiment run) {
+  try {
+    run.steps(2);
+    run.next_stage();
+    run.steps(2);
+  } catch (const RunawayError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Surfaces, ThatAppearAroundACentreOutOfWhichNoContactLeadsEndTheRun) {
+  const auto box = [](double low, double high) { return test::box_mesh({-1, -1, low}, {1, 1, high}, 3); };
+  const std::string of_sphere = ended_by(appear("mesh", {}, box(-0.5, 0.5)));
+  EXPECT_NE(of_sphere.find("step 3 (stage 'second'): wall 'mesh' appears"), std::string::npos) << of_sphere;
+  EXPECT_NE(of_sphere.find("grain 1 lies 0.5 m in its solid"), std::string::npos) << of_sphere;
+  const std::string of_clump = ended_by(appear("mesh", {}, box(0.7, 1.2)));
+  EXPECT_NE(of_clump.find("grain 0 lies 0.2 m in its solid"), std::string::npos) << of_clump;
+  // One that cuts into a sphere pushes it, and says how deep.
+  EXPECT_EQ(ended_by(appear("mesh", {}, box(-0.5, -0.5 * r))), "");
+  // A cylinder has contacts with what lies in it.
+  EXPECT_EQ(ended_by(appear("cylinder", {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {0.5}}}, {})),
+            "");
+}
+
+}  // namespace
+}  // namespace talus::validation::passages_of_surfaces_test
