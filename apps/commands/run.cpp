@@ -306,6 +306,9 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     else if (ranks.rank() == 0)
       terminal.say("the run in {} is done; to go on beyond its end, give its stage another one with --set",
                    run.directory);
+    // Who killed the run while the page was drawn gets it now.
+    if (ranks.rank() == 0 && !run.enough && !std::filesystem::exists(run.directory + "/report.html"))
+      write_page(terminal, run.directory, false);
     return *run.nothing_left;
   }
   share_walls(run.scene.setup, ranks);

@@ -41,7 +41,8 @@ std::string lammps_dump(const Frame& frame, std::size_t balls) {
                   frame.time, frame.step, frame.id.size(), box_of(frame));
   const auto out = std::back_inserter(text);
   text += balls > 1 ? "ITEM: ATOMS id mol type" : "ITEM: ATOMS id type";
-  text += " radius x y z vx vy vz";
+  text += " radius x y z";
+  if (!frame.u.empty()) text += " vx vy vz";
   if (!frame.omega.empty()) text += " omegax omegay omegaz";
   if (!frame.orientation.empty()) text += " quatw quati quatj quatk";
   text += '\n';
@@ -54,7 +55,7 @@ std::string lammps_dump(const Frame& frame, std::size_t balls) {
     if (balls > 1) fmt::format_to(out, " {}", grain + 1);
     fmt::format_to(out, " {} {}", material + 1, frame.radius[k]);
     put(frame.x[k]);
-    put(frame.u[k]);
+    if (!frame.u.empty()) put(frame.u[k]);
     if (!frame.omega.empty()) put(frame.omega[k]);
     if (!frame.orientation.empty())
       for (const double q : frame.orientation[k]) fmt::format_to(out, " {}", q);

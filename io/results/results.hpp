@@ -106,6 +106,10 @@ void demand_kept_frames(const std::filesystem::path& path, std::size_t kept);
 /// earlier versions do not tell. Throws FileError when it is no results.h5.
 bool holds_clumps(const std::filesystem::path& path);
 
+/// Whether frame `index` has velocities; false where there is no such frame. Throws FileError when the file is
+/// no results.h5.
+bool holds_velocities(const std::filesystem::path& path, std::size_t index);
+
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);
 

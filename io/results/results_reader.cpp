@@ -129,6 +129,18 @@ bool holds_clumps(const std::filesystem::path& path) {
   });
 }
 
+bool holds_velocities(const std::filesystem::path& path, std::size_t index) {
+  const detail::QuietHdf5 quiet;
+  const std::string name = path.string();
+  return detail::rehearsed(name, instead_of_results, [&] {
+    const Hdf5Object file = open_results(name);
+    const std::string frame = fmt::format("/frames/{:06}", index);
+    return H5Lexists(file.id(), frame.c_str(), H5P_DEFAULT) > 0 &&
+           H5Lexists(file.id(), (frame + "/bodies").c_str(), H5P_DEFAULT) > 0 &&
+           H5Lexists(file.id(), (frame + "/bodies/u").c_str(), H5P_DEFAULT) > 0;
+  });
+}
+
 std::size_t demand_frames(const std::filesystem::path& path) {
   const std::size_t frames = frame_count(path);
   if (frames > 0) return frames;

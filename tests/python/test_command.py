@@ -136,6 +136,14 @@ def test_a_sweep_is_a_product_with_a_table(heap, tmp_path):
     assert len(talus.read_table(tmp_path / "sweep" / "sweep.csv")) == 4
     again = talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.1, 0.5], resume=True)
     assert again.table["digest"].tolist() == table["digest"].tolist()
+    written = (tmp_path / "sweep" / "sweep.csv").read_bytes()
+    with pytest.raises(FileExistsError, match="resume=True keeps what is done"):
+        talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.1, 0.5])
+    assert (tmp_path / "sweep" / "sweep.csv").read_bytes() == written
+    with pytest.raises(AttributeError, match="no_such_table"):
+        talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.1, 0.5], resume=True,
+                    measure={"a": lambda run: run.no_such_table, "grains": lambda run: len(run.frame(-1).ids)})
+    assert talus.read_table(tmp_path / "sweep" / "sweep.csv")["grains"].tolist() == [60] * 4
 
 
 def test_a_sweep_says_which_key_it_does_not_know(heap, tmp_path):

@@ -203,3 +203,14 @@ def test_what_cannot_be_converted_is_refused_and_nothing_is_replaced(rain, tmp_p
         ended = convert(*words)
         assert ended.returncode == 2 and message in ended.stderr, ended.stderr
     assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_without_velocities_the_rest_is_converted(tmp_path):
+    scene = {**RAIN, "output": {"every_steps": 20, "velocities": False}}
+    run = talus.run(scene, tmp_path / "run", threads=1, progress=False)
+    for kind in ("lammps", "vtkhdf"):
+        assert convert(run.directory, "--to", kind).returncode == 0
+    _, columns = read_dump(run.directory / "grains.lammpstrj")[-1]
+    assert "vx" not in columns and np.array_equal(columns["x"], run.frame(-1).positions[:, 0])
+    with h5py.File(run.directory / "grains.vtkhdf") as file:
+        assert "velocity" not in file["VTKHDF/PointData"] and len(file["VTKHDF/PointData/radius"]) > 0

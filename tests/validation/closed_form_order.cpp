@@ -55,6 +55,23 @@ TEST(Order, GrainOnABoulderIsAtLeastOfFirstOrder) {
   }
 }
 
+/// A grain slides around in a tube, without weight or friction: relative loss of its speed in 0.5 s.
+double loss_in_tube(double h, double rate) {
+  const double tube = 0.1, grain = 0.01, path = tube - grain;
+  Scene scene(h);
+  scene.surface("cylinder", {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {tube}}, {"inside", {1}}});
+  scene.sphere({0, 0, -path}, grain, 1, {rate * path, 0, 0});
+  Experiment run(std::move(scene));
+  while (run.time() < 0.5 - 1e-9) run.step();
+  return 1 - run.u().norm() / (rate * path);
+}
+
+TEST(Order, AlongAHollowCurveIsOneAndActsAsFriction) {
+  for (const double rate : {5.0, 10.0})
+    for (const double h : {2e-4, 1e-4, 5e-5})
+      EXPECT_NEAR(loss_in_tube(h, rate), 0.5 * rate * rate * h * 0.5, 0.02 * 0.25 * rate * rate * h) << h;
+}
+
 /// Errors for four time steps. An event is met within a step, at a place in it that is as good as random: so
 /// the error is averaged over 64 starts.
 template <class Error>

@@ -13,10 +13,12 @@
 namespace talus::validation::passages_of_surfaces_test {
 namespace {
 
+constexpr double step_length = 1e-3;  // [s]
+
 /// A body at rest at the origin, its lowest point at z = -r, and a surface 0.5 m below that moves upwards: of
 /// no thickness, or of a tenth of r.
 Experiment sweep(const std::string& shape, bool clump, double speed, double begin) {
-  ClumpScene scene(h);
+  ClumpScene scene(step_length);
   if (!clump) scene.setup.clumps.clear();
   const double z = -0.5 - begin;
   if (shape == "rectangle")
@@ -40,7 +42,7 @@ TEST(Surfaces, ThatSweepPastABodyWithoutTouchingItAreTold) {
     for (const bool clump : {false, true})
       for (const double far : {2.5, 5.0, 40.0, 1500.0})
         for (int cut = 0; cut < 4; ++cut) {
-          const double speed = far * r / h;
+          const double speed = far * r / step_length;
           Experiment run = sweep(shape, clump, speed, 0.25 * cut * far * r);
           std::int64_t passed = 0;
           while (run.time() * speed < 0.5 + far * r * (2 + 0.25 * cut)) passed += run.step().passed;
@@ -53,7 +55,7 @@ TEST(Surfaces, ThatSweepPastABodyWithoutTouchingItAreTold) {
 
 /// A surface that appears in the second stage, where a dumbbell is, and a sphere.
 Experiment appear(const std::string& shape, ShapeNumbers numbers, std::vector<Triangle> triangles) {
-  ClumpScene scene(h);
+  ClumpScene scene(step_length);
   scene.surface(shape, std::move(numbers), std::move(triangles));
   scene.setup.walls.back().from_stage = "second";
   scene.stage().end.steps = 2;
@@ -77,7 +79,7 @@ std::string ended_by(Experiment run) {
 }
 
 TEST(Surfaces, ThatAppearAroundACentreOutOfWhichNoContactLeadsEndTheRun) {
-  const auto box = [](double low, double high) { return test::box_mesh({-1, -1, low}, {1, 1, high}, 3); };
+  const auto box = [](double low, double high) { return test::box_mesh({-1, -1, low}, {1, 1, high}); };
   const std::string of_sphere = ended_by(appear("mesh", {}, box(-0.5, 0.5)));
   EXPECT_NE(of_sphere.find("step 3 (stage 'second'): wall 'mesh' appears"), std::string::npos) << of_sphere;
   EXPECT_NE(of_sphere.find("grain 1 lies 0.5 m in its solid"), std::string::npos) << of_sphere;

@@ -192,6 +192,51 @@ TEST_F(ResumeRefusals, AreNoneForTheNumberOfSubdomainsThatARunHasChosen) {
   EXPECT_NE(again.messages.find("is done"), std::string::npos) << again.messages;
 }
 
+TEST_F(ResumeRefusals, OfStatesThatAreMissingOrDamaged) {
+  const std::string line = "run scene.toml --out out --threads 1 --resume";
+  ASSERT_EQ(run(line + " --steps 5").code, 0);
+  const std::string whole = content(at("out/results.h5"));
+  const auto refused = [&](const char* what) {
+    const auto before = files_below(at("out"));
+    const Outcome outcome = run(line);
+    EXPECT_EQ(outcome.code, 2) << what << outcome.messages;
+    EXPECT_NE(outcome.messages.find("results.h5"), std::string::npos) << what << outcome.messages;
+    EXPECT_EQ(files_below(at("out")), before) << what;
+  };
+  fs::remove(at("out/results.h5"));
+  refused("missing");
+  write(at("out/results.h5"), whole.substr(0, whole.size() / 2));
+  refused("cut off");
+  // The directory of a group begins with SNOD: none of the first frame can be found any more.
+  std::string damaged = whole;
+  for (std::size_t at = damaged.find("SNOD"); at != std::string::npos; at = damaged.find("SNOD", at))
+    damaged.replace(at, 4, "snod");
+  write(at("out/results.h5"), damaged);
+  refused("damaged");
+  write(at("out/results.h5"), whole);
+  EXPECT_EQ(run(line).code, 0);
+}
+
+TEST_F(ResumeRefusals, AreNoneOfStepsThatAreDoneAndMakeNoMore) {
+  const std::string line = "run scene.toml --out out --threads 1 --resume --steps ";
+  ASSERT_EQ(run(line + "5").code, 0);
+  const auto before = files_below(at("out"));
+  for (const char* steps : {"5", "2"}) {
+    const Outcome again = run(line + steps);
+    EXPECT_EQ(again.code, 0) << again.messages;
+    EXPECT_NE(again.messages.find("has made 5 steps, and --steps"), std::string::npos) << again.messages;
+    EXPECT_EQ(files_below(at("out")), before) << steps;
+  }
+}
+
+TEST_F(ResumeRefusals, OfARunThatIsDoneGiveItThePageThatItLacks) {
+  const std::string line = "run scene.toml --out out --threads 1 --resume";
+  ASSERT_EQ(run(line).code, 0);
+  fs::remove(at("out/report.html"));
+  EXPECT_EQ(run(line).code, 0);
+  EXPECT_TRUE(fs::exists(at("out/report.html")));
+}
+
 TEST_F(ResumeRefusals, OfCheckpointsThatAreAllDamaged) {
   const std::string line = "run scene.toml --out out --threads 1 --resume";
   ASSERT_EQ(run(line + " --steps 3").code, 0);

@@ -96,7 +96,9 @@ def sweep(
     {"peak": lambda run: run.triaxial["q_over_p"].max()}. The table is also written to out/sweep.csv.
 
     All scenes are checked before the first run begins: raises SceneError where one is wrong, ValueError where nothing is
-    varied. A run that fails does not end the others: its row has the exit code, `errors` the message.
+    varied, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them. A run that
+    fails does not end the others: its row has the exit code, `errors` the message. What a `measure` raises is raised
+    when all runs have ended and the table is written, with NaN in its place.
     """
     base = scene.copy() if isinstance(scene, Scene) else \
         Scene.load(scene) if isinstance(scene, (str, os.PathLike)) else Scene(scene)
@@ -113,6 +115,9 @@ def sweep(
         scenes.append(changed)
     out = Path(out)
     directories = [out / f"{k:03}" for k in range(len(points))]
+    there = [directory for directory in directories if (directory / "run.json").exists()]
+    if there and not (resume or force):
+        raise FileExistsError(f"{there[0]} holds a run: resume=True keeps what is done, force=True runs all anew")
 
     def one(changed: Scene, directory: Path) -> RunError | None:
         if resume and (directory / "run.json").exists() and Run(directory).status == "done":
@@ -126,10 +131,21 @@ def sweep(
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         errors = list(pool.map(one, scenes, directories))
-    measured = [{} if error else {name: float(number(Run(directory))) for name, number in (measure or {}).items()}
+    failed: list[Exception] = []
+
+    def number_of(number: Measure, directory: Path) -> float:
+        try:
+            return float(number(Run(directory)))
+        except Exception as error:  # the user's own function: the table comes first
+            failed.append(error)
+            return float("nan")
+
+    measured = [{} if error else {name: number_of(number, directory) for name, number in (measure or {}).items()}
                 for directory, error in zip(directories, errors)]
     ended = Sweep(list(values), points, directories, errors, measured)
     ended.save(out / "sweep.csv")
+    if failed:
+        raise failed[0]
     return ended
 
 
