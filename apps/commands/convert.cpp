@@ -64,9 +64,7 @@ Conversion conversion_of(const ConvertOptions& options) {
 
 /// Neither format has contacts, nor shapes but spheres.
 Frame frame_of(const Conversion& todo, std::size_t k) {
-  const bool moves = io::holds_velocities(todo.results, k);
-  Frame frame =
-      io::read_frame(todo.results, k, moves ? io::FrameParts::without_contacts : io::FrameParts::places);
+  Frame frame = io::read_frame(todo.results, k, io::FrameParts::grains);
   return todo.shapes.clump ? io::frame_of_balls(frame, todo.shapes) : frame;
 }
 

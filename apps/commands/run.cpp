@@ -123,12 +123,12 @@ void look_for_checkpoint(const RunOptions& options, const graph::Communicator& r
     compare_scenes(run.scene, run.resolved, *run.point);
     if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
     const std::int64_t step = run.point->file.state.head.report.step;
-    if (options.steps && step >= *options.steps) {
+    if (!run.nothing_left && earlier.done && options.steps && step >= *options.steps) {
       run.nothing_left = earlier.exit_code;
       run.enough = step;
     }
     if (ranks.rank() == 0 && !run.nothing_left)
-      demand_files_of_run(run.directory, run.scene.output, run.point->memory.mark);
+      demand_files_of_run(run.directory, run.scene.output, run.point->memory.mark, !options.dry_run);
     take_over(*run.point, run.scene);
     run.warnings = earlier.warnings;
   } else if (earlier.complete) {
@@ -301,13 +301,14 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   if (options.dry_run) return exit_done;
   if (run.nothing_left) {
     if (ranks.rank() == 0 && run.enough)
-      terminal.say("the run in {} has made {} steps, and --steps {} asks for no more; nothing was written",
+      terminal.say("the run in {} has made {} steps, and --steps {} asks for no more; nothing was done",
                    run.directory, *run.enough, *options.steps);
     else if (ranks.rank() == 0)
       terminal.say("the run in {} is done; to go on beyond its end, give its stage another one with --set",
                    run.directory);
     // Who killed the run while the page was drawn gets it now.
-    if (ranks.rank() == 0 && !run.enough && !std::filesystem::exists(run.directory + "/report.html"))
+    std::error_code unknown;
+    if (ranks.rank() == 0 && !std::filesystem::exists(run.directory + "/report.html", unknown))
       write_page(terminal, run.directory, false);
     return *run.nothing_left;
   }

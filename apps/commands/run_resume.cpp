@@ -134,25 +134,32 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
 }
 
 void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
-                         const io::OutputMark& mark) {
-  for (const auto& [name, known] : mark.files) {
-    if (!goes_on(name, output)) continue;
+                         const io::OutputMark& mark, bool mends) {
+  const auto refuse = [&](const std::string& name, const std::string& what) {
+    throw std::invalid_argument(fmt::format(
+        "{}: {}. Put the file back, or begin a run in another directory, from this state if you like "
+        "([sample] kind = \"state\")",
+        (directory / name).string(), what));
+  };
+  const auto demand_file = [&](const std::string& name) {
     const std::filesystem::path path = directory / name;
-    const auto refuse = [&](const std::string& what) {
-      throw std::invalid_argument(fmt::format(
-          "{}: {}. Put the file back, or begin a run in another directory, from this state if you like "
-          "([sample] kind = \"state\")",
-          path.string(), what));
-    };
     std::error_code unknown;
     if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(path, unknown)))
-      refuse("the run would go on in this file, and there is none");
-    if (::access(path.c_str(), W_OK) != 0) refuse("the run would go on in this file, and may not write it");
-    if (io::crc_of_file(path, known.bytes) != known.crc)
-      refuse(fmt::format("the run wrote {} bytes until the checkpoint, and these are others", known.bytes));
+      refuse(name, "the run would go on in this file, and there is none");
+    if (::access(path.c_str(), W_OK) != 0)
+      refuse(name, "the run would go on in this file, and may not write it");
+  };
+  for (const auto& [name, known] : mark.files) {
+    if (!goes_on(name, output)) continue;
+    demand_file(name);
+    if (io::crc_of_file(directory / name, known.bytes) != known.crc)
+      refuse(name,
+             fmt::format("the run wrote {} bytes until the checkpoint, and these are others", known.bytes));
   }
-  if (mark.frame_times.empty() || !goes_on("results.h5", output)) return;
-  io::demand_kept_frames(directory / "results.h5", mark.frame_times.size());
+  const std::string results = "results.h5";
+  if (!goes_on(results, output)) return;
+  demand_file(results);
+  if (mends) io::demand_kept_frames(directory / results, mark.frame_times.size());
 }
 
 void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
@@ -201,6 +208,7 @@ EarlierRun earlier_run(const std::filesystem::path& directory) {
   const nlohmann::json& summary = read["summary"];
   if (const auto complete = summary.find("complete"); complete != summary.end() && complete->is_boolean())
     run.complete = complete->get<bool>();
+  if (const auto status = summary.find("status"); status != summary.end()) run.done = *status == "done";
   if (const auto code = summary.find("exit_code"); code != summary.end() && code->is_number_integer())
     run.exit_code = code->get<int>();
   if (const auto warnings = summary.find("warnings"); warnings != summary.end() && warnings->is_array())

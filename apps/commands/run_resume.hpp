@@ -35,8 +35,10 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
 
 /// Throws std::invalid_argument naming a file that the run would go on in and that is not the one which it
 /// wrote until the checkpoint, or cannot be written. Files that are not asked for any more are left alone.
+/// `mends`: results.h5, which is mended first where a kill has left its directory in pieces, is looked
+/// through.
 void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
-                         const io::OutputMark& mark);
+                         const io::OutputMark& mark, bool mends);
 
 /// Of a directory without a checkpoint: throws std::invalid_argument unless the results in it, if there are
 /// any, are those of this scene, whose walls have been placed. Of a run that is done nothing may differ, of
@@ -50,6 +52,7 @@ void take_over(const ResumePoint& point, io::Scene& scene);
 /// What run.json in a directory says.
 struct EarlierRun {
   bool complete = false;  ///< the last stage of the scene has ended
+  bool done = false;      ///< it has ended by itself, if only where --steps asked for it
   int exit_code = 0;
   std::vector<std::string> warnings;  ///< of the scene
 };

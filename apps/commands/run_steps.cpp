@@ -154,6 +154,13 @@ Stop advance(Advance& all) {
   Lines lines(all.run);
   if (!all.run.resume && all.run.scene.output.stage_frames) all.write_frame();
   Stop stop;
+  if (const auto& steps = all.run.options.steps; steps && all.simulation.report().step >= *steps) {
+    // A run that was killed behind its last checkpoint lacks its end only, and the frame of it.
+    const std::vector<double>& times = all.memory.mark.frame_times;
+    if (all.run.scene.output.stage_frames && (times.empty() || times.back() != all.simulation.report().time))
+      all.write_frame();
+    return stop;
+  }
   while (!all.simulation.finished()) {
     stop = {};
     if (advance_step(all, lines, stop)) break;

@@ -72,7 +72,13 @@ class Problem {
           "smaller --at-step",
           sample.scene.source_file, simulation.report().step, plan.at_step));
     saved_ = simulation.save();
-    // The step is solved without the grains that come and go with it.
+    if (saved_.bodies.size() == 0)
+      throw std::runtime_error(fmt::format(
+          "{}: there are no grains behind step {}, and so nothing to solve; choose a larger --at-step",
+          sample.scene.source_file, plan.at_step));
+    // The step is solved without the grains that come and go with it, but looks as far as with them.
+    setup_.detection.alert = simulation.parameters().alert;
+    setup_.detection.skin = simulation.parameters().skin;
     setup_.inserts.clear();
     setup_.removes.clear();
     saved_.population = {};

@@ -51,7 +51,8 @@ void validate(const Frame& frame, FrameParts parts) {
   const std::size_t bodies = frame.id.size();
   demand_same_length(frame.x.size(), bodies, "x");
   demand_same_length(frame.radius.size(), bodies, "radius");
-  demand_same_length(frame.u.size(), parts == FrameParts::places ? 0 : bodies, "u");
+  if (parts != FrameParts::grains || !frame.u.empty())
+    demand_same_length(frame.u.size(), parts == FrameParts::places ? 0 : bodies, "u");
   if (!frame.omega.empty()) demand_same_length(frame.omega.size(), bodies, "omega");
   if (!frame.orientation.empty()) demand_same_length(frame.orientation.size(), bodies, "orientation");
   if (!frame.material.empty()) demand_same_length(frame.material.size(), bodies, "material");
@@ -142,7 +143,8 @@ void cut_frames(const std::string& path, std::size_t kept) {
   detail::drop_directory(path);
 }
 
-/// Goes through the directories of all frames, and throws for what is no HDF5 there, too.
+/// Reads which arrays the frames have, those to be cut off included, as cutting walks through them. Throws
+/// FileError where HDF5 cannot read that; the arrays are not read.
 void look_through(const std::string& path, std::size_t kept) {
   const Hdf5Object access = file_access(path);
   const Hdf5Object file =

@@ -34,8 +34,9 @@
 
 namespace talus::io {
 
-/// What of a frame is read: contacts are most of it. `places`: neither contacts nor velocities.
-enum class FrameParts { all, without_contacts, places };
+/// What of a frame is read: contacts are most of it. `grains`: no contacts, and velocities where they are
+/// there; `places`: neither contacts nor velocities.
+enum class FrameParts { all, without_contacts, grains, places };
 
 /// Throws std::invalid_argument naming the array whose length does not fit the others; `omega`,
 /// `orientation` and `material` may be empty, and `u` where places are all that is asked for.
@@ -98,17 +99,13 @@ class ResultsWriter {
   std::size_t frames_ = 0;
 };
 
-/// Throws FileError unless a results.h5 that a run goes on with, whose directory is brought back first, holds
-/// the first `kept` frames, and the directories of all its frames can be read.
+/// Of a results.h5 that a run goes on with, whose directory is brought back first: throws FileError unless it
+/// holds the first `kept` frames, and HDF5 can read which arrays all its frames have.
 void demand_kept_frames(const std::filesystem::path& path, std::size_t kept);
 
 /// Whether its bodies are clumps, of whose shapes frames have the bounding spheres only; files of
 /// earlier versions do not tell. Throws FileError when it is no results.h5.
 bool holds_clumps(const std::filesystem::path& path);
-
-/// Whether frame `index` has velocities; false where there is no such frame. Throws FileError when the file is
-/// no results.h5.
-bool holds_velocities(const std::filesystem::path& path, std::size_t index);
 
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);

@@ -129,18 +129,6 @@ bool holds_clumps(const std::filesystem::path& path) {
   });
 }
 
-bool holds_velocities(const std::filesystem::path& path, std::size_t index) {
-  const detail::QuietHdf5 quiet;
-  const std::string name = path.string();
-  return detail::rehearsed(name, instead_of_results, [&] {
-    const Hdf5Object file = open_results(name);
-    const std::string frame = fmt::format("/frames/{:06}", index);
-    return H5Lexists(file.id(), frame.c_str(), H5P_DEFAULT) > 0 &&
-           H5Lexists(file.id(), (frame + "/bodies").c_str(), H5P_DEFAULT) > 0 &&
-           H5Lexists(file.id(), (frame + "/bodies/u").c_str(), H5P_DEFAULT) > 0;
-  });
-}
-
 std::size_t demand_frames(const std::filesystem::path& path) {
   const std::size_t frames = frame_count(path);
   if (frames > 0) return frames;
@@ -169,10 +157,10 @@ Frame load_frame(const std::string& name, std::size_t index, FrameParts parts) {
   frame.id = read_integers<std::int64_t>(h, name, "bodies/id");
   frame.x = read_doubles<Vec3>(h, name, "bodies/x");
   frame.radius = read_doubles<double>(h, name, "bodies/radius");
-  if (parts != FrameParts::places) {
+  if (parts == FrameParts::all || parts == FrameParts::without_contacts)
     demand({h, name}, "bodies/u", "output.velocities");
+  if (parts != FrameParts::places && H5Lexists(h, "bodies/u", H5P_DEFAULT) > 0)
     frame.u = read_doubles<Vec3>(h, name, "bodies/u");
-  }
   if (H5Lexists(h, "bodies/omega", H5P_DEFAULT) > 0)
     frame.omega = read_doubles<Vec3>(h, name, "bodies/omega");
   if (H5Lexists(h, "bodies/orientation", H5P_DEFAULT) > 0) {

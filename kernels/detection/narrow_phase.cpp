@@ -175,11 +175,12 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     // centre.
     const Vec3 u = Eigen::Map<const Vec3>(in.velocity[i].u), v = u - of.velocity_at(in.x[i]),
                free = v + in.time_step * in.gravity;
+    // Asked first: from deep in a solid no feature is to be seen any more.
+    through += detail::passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
     points.clear();
     collide(of, in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
-    through += detail::passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
     const PairLaw& law = law_of(phase, pair);
     const GapResult<double> found =
         solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),

@@ -26,11 +26,14 @@ Deepest deeper(const Deepest& a, const Deepest& b) {
 Deepest deepest_in(const Wall& wall, const StepState& state) {
   const ClumpView clumps{state.bodies.shape, state.bodies.orientation, state.clumps};
   Deepest deepest;
+  const Bounds bounds = wall.surface()->bounds();
   std::vector<SurfacePoint> points;
   for (std::size_t s = 0; s < state.bodies.size(); ++s)
     for (std::size_t ball = 0; ball < clumps.balls(s); ++ball) {
       const auto [centre, radius] = ball_of(clumps, s, ball, state.bodies.x[s], state.bodies.radius[s]);
-      const double depth = wall.surface()->depth(wall.pose.back(centre));
+      // What lies far outside of a container is in its solid, too, but does not meet it.
+      const Vec3 in_place = wall.pose.back(centre);
+      const double depth = bounds.near(in_place, radius) ? wall.surface()->depth(in_place) : 0;
       points.clear();
       if (depth > 0) collide(wall, centre, radius, points);
       if (depth > 0 && points.empty())
@@ -51,10 +54,10 @@ void demand_grains_outside(const Stage& stage, const std::string& step, const St
       all = deeper(all, of_rank);
     if (all.depth > 0)
       throw RunawayError(fmt::format(
-          "{}: wall '{}' appears where grains are: the centre of grain {} lies {:.6g} m in its solid, out of "
-          "which no contact leads. Remove the grains there before, let the wall appear elsewhere, or say "
-          "with "
-          "`inside` of it on which side of its surface the grains are",
+          "{}: wall '{}' appears where grains are: the centre of grain {}, or of a ball of it, lies {:.6g} m "
+          "inside its solid, from where no contact would push it out. Remove such grains as the stage "
+          "begins, "
+          "or before ([[remove]]), or let the wall appear in another place",
           step, wall.name, all.body, all.depth));
   }
 }

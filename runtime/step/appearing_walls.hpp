@@ -10,10 +10,10 @@
 
 namespace talus {
 
-/// Throws RunawayError, in which `step` is named, where a surface that appears with the stage is that of a
-/// solid, of a mesh above all, in which the centre of a grain lies, or of a ball of a clump, that touches the
-/// surface nowhere: contacts know what comes through a surface, and none would lead out of there. Collective,
-/// on all ranks alike.
+/// A mesh pushes only what is in front of its triangles: a centre that is already inside would never be
+/// pushed out. Throws RunawayError, in which `step` is named, where a surface that appears with the stage has
+/// such a grain, or a clump with such a ball, in its solid. Grains that come and go with the step have done
+/// so. Collective, on all ranks alike.
 void demand_grains_outside(const Stage& stage, const std::string& step, const StepState& state,
                            const graph::Communicator& ranks);
 

@@ -57,7 +57,7 @@ TEST_F(DamagedFile, OfResultsThatARunGoesOnInIsAnError) {
   results.replace(results.find("HEAP") + 8, 8, 8, '\xff');
   write(at("out/results.h5"), results);
   const Outcome outcome = run("run scene.toml --out out --resume");
-  EXPECT_EQ(outcome.code, 1) << outcome.messages;
+  EXPECT_EQ(outcome.code, 2) << outcome.messages;
   EXPECT_NE(outcome.messages.find("results.h5: "), std::string::npos) << outcome.messages;
 }
 

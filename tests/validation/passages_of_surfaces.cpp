@@ -53,6 +53,32 @@ TEST(Surfaces, ThatSweepPastABodyWithoutTouchingItAreTold) {
   EXPECT_GT(missed, 50) << "else nothing is looked at here";
 }
 
+/// A ball that comes to lie deep in a solid, where none of its triangles is near any more.
+TEST(Surfaces, OfAThickSolidTellOfABodyThatEndsDeepInIt) {
+  int entered = 0;
+  for (const bool clump : {false, true})
+    for (const double far : {2.5, 4.0, 5.0, 8.0})
+      for (int cut = 0; cut < 8; ++cut) {
+        ClumpScene scene(step_length);
+        if (!clump) scene.setup.clumps.clear();
+        scene.surface("mesh", {}, test::box_mesh({-4, -4, -4}, {4, 4, 0}));
+        scene.stage().laws.set_all(&PairLaw::restitution, 0.5);
+        const double way = far * r;
+        const Vec3 begin(0.3, 0.2, 0.15 + (2 + cut / 8.0) * way), u(0, 0, -way / step_length);
+        if (clump)
+          scene.dumbbell(begin, about(Vec3::UnitY(), 0.3), u);
+        else
+          scene.sphere(begin, r, mass, u);
+        Experiment run(std::move(scene));
+        std::int64_t passed = 0;
+        for (int k = 0; k < 4; ++k) passed += run.step().passed;
+        if (run.x()[2] > 0) continue;
+        ++entered;
+        EXPECT_GT(passed, 0) << (clump ? "dumbbell, " : "sphere, ") << far << ", " << cut;
+      }
+  EXPECT_GT(entered, 10) << "else nothing is looked at here";
+}
+
 /// A surface that appears in the second stage, where a dumbbell is, and a sphere.
 Experiment appear(const std::string& shape, ShapeNumbers numbers, std::vector<Triangle> triangles) {
   ClumpScene scene(step_length);
@@ -82,11 +108,16 @@ TEST(Surfaces, ThatAppearAroundACentreOutOfWhichNoContactLeadsEndTheRun) {
   const auto box = [](double low, double high) { return test::box_mesh({-1, -1, low}, {1, 1, high}); };
   const std::string of_sphere = ended_by(appear("mesh", {}, box(-0.5, 0.5)));
   EXPECT_NE(of_sphere.find("step 3 (stage 'second'): wall 'mesh' appears"), std::string::npos) << of_sphere;
-  EXPECT_NE(of_sphere.find("grain 1 lies 0.5 m in its solid"), std::string::npos) << of_sphere;
-  const std::string of_clump = ended_by(appear("mesh", {}, box(0.7, 1.2)));
-  EXPECT_NE(of_clump.find("grain 0 lies 0.2 m in its solid"), std::string::npos) << of_clump;
+  EXPECT_NE(of_sphere.find("grain 1, or of a ball of it, lies 0.5 m inside"), std::string::npos) << of_sphere;
+  const std::string of_clump = ended_by(appear("mesh", {}, box(0.75, 1.25)));
+  EXPECT_NE(of_clump.find("grain 0, or of a ball of it, lies 0.25 m inside"), std::string::npos) << of_clump;
+  // Of a container, in whose solid all that is outside lies, only what it meets counts.
+  const std::string of_container = ended_by(appear("mesh", {{"inside", {1}}}, box(-2, 0.9375)));
+  EXPECT_NE(of_container.find("grain 0, or of a ball of it, lies 0.0625 m inside"), std::string::npos)
+      << of_container;
+  EXPECT_EQ(ended_by(appear("mesh", {{"inside", {1}}}, box(-0.5, 0.5))), "");
   // One that cuts into a sphere pushes it, and says how deep.
-  EXPECT_EQ(ended_by(appear("mesh", {}, box(-0.5, -0.5 * r))), "");
+  EXPECT_EQ(ended_by(appear("mesh", {}, box(-0.5, -0.0625))), "");
   // A cylinder has contacts with what lies in it.
   EXPECT_EQ(ended_by(appear("cylinder", {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {0.5}}}, {})),
             "");

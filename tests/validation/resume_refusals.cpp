@@ -227,6 +227,14 @@ TEST_F(ResumeRefusals, AreNoneOfStepsThatAreDoneAndMakeNoMore) {
     EXPECT_NE(again.messages.find("has made 5 steps, and --steps"), std::string::npos) << again.messages;
     EXPECT_EQ(files_below(at("out")), before) << steps;
   }
+  // Of a run that was killed behind its last checkpoint the end is written, without a step.
+  const std::string whole = content(at("out/run.json"));
+  ASSERT_NE(whole.find("\"status\": \"done\""), std::string::npos);
+  write(at("out/run.json"), replaced(whole, "\"status\": \"done\"", "\"status\": \"running\""));
+  EXPECT_EQ(run(line + "5").code, 0);
+  EXPECT_NE(content(at("out/run.json")).find("\"status\": \"done\""), std::string::npos);
+  for (const char* name : {"steps.csv", "walls.csv"})
+    EXPECT_EQ(content(at("out") / name), before.at(name)) << name;
 }
 
 TEST_F(ResumeRefusals, OfARunThatIsDoneGiveItThePageThatItLacks) {

@@ -120,8 +120,6 @@ def sweep(
         raise FileExistsError(f"{there[0]} holds a run: resume=True keeps what is done, force=True runs all anew")
 
     def one(changed: Scene, directory: Path) -> RunError | None:
-        if resume and (directory / "run.json").exists() and Run(directory).status == "done":
-            return None
         try:
             run(changed, directory, ranks=ranks, threads=threads, resume=resume, force=force, options=options,
                 progress=progress, program=program)
@@ -133,14 +131,15 @@ def sweep(
         errors = list(pool.map(one, scenes, directories))
     failed: list[Exception] = []
 
-    def number_of(number: Measure, directory: Path) -> float:
+    def number_of(name: str, number: Measure, directory: Path) -> float:
         try:
             return float(number(Run(directory)))
         except Exception as error:  # the user's own function: the table comes first
+            error.add_note(f"while '{name}' was measured of {directory}")
             failed.append(error)
             return float("nan")
 
-    measured = [{} if error else {name: number_of(number, directory) for name, number in (measure or {}).items()}
+    measured = [{} if error else {name: number_of(name, number, directory) for name, number in (measure or {}).items()}
                 for directory, error in zip(directories, errors)]
     ended = Sweep(list(values), points, directories, errors, measured)
     ended.save(out / "sweep.csv")

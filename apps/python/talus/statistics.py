@@ -103,31 +103,35 @@ def displacements(frames: Sequence[Frame]) -> np.ndarray:
     """How far the grains of the first frame have moved until each frame [m], shape (frames, n, 3), in order of its ids.
 
     In a periodic cell against its flow: from one frame to the next a grain that stays where it is in the cell has moved
-    by nothing, and what the others have moved adds up, through any face. So `(d**2).mean(axis=1)` is the mean square
-    displacement. Two frames that follow one another have to be so near in time that no grain moves by half of an edge
-    against the flow, nor the cell by a shear of half. Raises MissingData where a frame lacks one of the grains, and
-    ValueError without a frame.
+    by nothing, and what the others have moved adds up, through any face. So `(d**2).sum(axis=2).mean(axis=1)` is the
+    mean square displacement. Two frames that follow one another have to be so near in time that no grain moves by half of
+    an edge against the flow, nor the cell by a shear of half. Raises MissingData where a frame lacks one of the grains,
+    and ValueError without a frame. Results of versions that wrote no cell are taken for those of no cell.
     """
     if len(frames) == 0:
         raise ValueError("the displacement from no frame is not defined")
     ids = frames[0].ids
     moved = np.zeros((len(frames), len(ids), 3))
+    periodic = _is_periodic(frames[0])
     before, then = frames[0], frames[0].positions
     for k in range(1, len(frames)):
         now = frames[k]
         there = now.positions[now.rows(ids)]
-        moved[k] = moved[k - 1] + _moved(before, then, now, there)
+        moved[k] = moved[k - 1] + (_moved(before, then, now, there) if periodic else there - then)
         before, then = now, there
     return moved
 
 
-def _moved(before: Frame, then: np.ndarray, now: Frame, there: np.ndarray) -> np.ndarray:
-    """From positions `then` to those `there` [m], against the flow of the cell where there is one."""
+def _is_periodic(frame: Frame) -> bool:
     try:
-        edges = before.cell
+        return len(frame.cell) > 0
     except MissingData:
-        return there - then
-    carried = (then - before.cell_origin) @ np.linalg.inv(_filled(edges)) @ _filled(_edges_carried(before, now))
+        return False
+
+
+def _moved(before: Frame, then: np.ndarray, now: Frame, there: np.ndarray) -> np.ndarray:
+    """From positions `then` to those `there` [m], against the flow of the cell."""
+    carried = (then - before.cell_origin) @ np.linalg.inv(_filled(before.cell)) @ _filled(_edges_carried(before, now))
     return now.nearest(there - now.cell_origin - carried)
 
 

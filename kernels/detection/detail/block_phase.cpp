@@ -63,8 +63,8 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   meeting.fall = in.time_step * in.gravity - wall.gain;
   if (wall.surface() != nullptr) {
     // Behind a thin surface, and in a solid, the point where the ball is near it now tells nothing.
-    const Mat3 to_ball = lever_of(in, pair.body, touch.ball.centre - in.x[at(pair.body)]);
-    const Vec3 v = velocity_at(in, pair.body, to_ball) - wall.velocity_at(touch.ball.centre);
+    const Mat3 lever = lever_of(in, pair.body, touch.ball.centre - in.x[at(pair.body)]);
+    const Vec3 v = velocity_at(in, pair.body, lever) - wall.velocity_at(touch.ball.centre);
     meeting.passed = passed_surface(wall, touch.ball.centre, in.time_step * v, touch.ball.radius);
     return meeting;
   }
@@ -120,8 +120,8 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     const bool wall = k >= grains;
     const Meeting meeting = wall ? meet(in, poses, candidates.wall_pairs[k - grains])
                                  : meet(in, poses, candidates.grain_pairs[k], candidates.balls[k]);
-    if (wall && !has_feature(in, candidates.wall_pairs[k - grains], meeting)) continue;
     through += meeting.passed ? 1 : 0;
+    if (wall && !has_feature(in, candidates.wall_pairs[k - grains], meeting)) continue;
     const double v_n = meeting.touch.normal.dot(meeting.v);
     const PairLaw& law = law_at(in.laws, candidates, materials, k);
     const GapResult<double> found =

@@ -10,9 +10,9 @@ bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double rad
   std::vector<SurfacePoint> points;
   constexpr double most = 256;  // looks
   const double length = way.norm(), looks = std::ceil(std::min(most, 4 * length / radius));
-  // Between two looks that lie far apart no surface is to be missed.
-  const double deep = std::max(0.5 * radius, length / looks);
-  for (double look = 0; look < looks && points.empty(); ++look)
+  // Where looks lie far apart they reach to one another, and to where the way began.
+  const double deep = std::max(0.5 * radius, length / looks), last = deep > 0.5 * radius ? looks : looks - 1;
+  for (double look = 0; look <= last && points.empty(); ++look)
     collide(wall, x - look / looks * way, deep, points);
   return !points.empty();
 }

@@ -35,7 +35,7 @@ inline bool passed(const Vec3& d, const Vec3& way, double touching, double small
 
 /// True when a ball that has moved to `x` by `way`, relative to the wall, was deep in a surface on that way:
 /// such a step is too long, and the ball may have passed a thin surface, or into a solid, from where no
-/// contact leads out.
+/// contact leads out. On a way of more than 64 radii one that came near counts, too.
 bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius);
 
 }  // namespace talus::detail

@@ -289,7 +289,7 @@ std::shared_ptr<const Surface> make_mesh(std::vector<Triangle> triangles, bool i
   demand_closed(triangles);
   if (!(six_volumes(triangles) > 0))
     throw std::invalid_argument(
-        "the surface is inverted: " + name_of(0) + " and all others face into what they enclose; " +
+        "the surface is inverted: " + name_of(0) + " and all others face into the solid; " +
         (inside
              ? "corners go counterclockwise as seen from outside, with inside = true, too: turn each triangle"
              : "where the grains are inside, say inside = true, else turn each triangle"));

@@ -244,7 +244,6 @@ struct Simulation::Implementation {
 
   void choose_time_step() {
     set_walls(setup, report.time, parameters.time_step, state);
-    if (stage_steps == 0) demand_grains_outside(stage(), next_step().text(), state, ranks);
     if (!stage().chooses_time_step) return;
     prepare_walls(report.time, parameters.time_step, state, ranks);
     double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
@@ -310,6 +309,7 @@ struct Simulation::Implementation {
   /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
     state.time = report.time;
+    if (stage_steps == 0) demand_grains_outside(stage(), next_step().text(), state, ranks);
     if (state.domain.flows) check_edges();
     if (state.domain.flows)
       begin_flow(
@@ -360,8 +360,8 @@ struct Simulation::Implementation {
   StageClock clock;    ///< of a stage that chooses its time steps
   double sheared = 0;  ///< path of the cell's shear since the stage began
   double held = 0;     ///< time for which the stage's bound on equilibrium has held [s]
-  double falls_in =
-      0;  ///< where it has: fall_time of the last step, whose loads a resumed run has yet to find [s]
+  /// Where it has: fall_time of the last step [s], whose loads a resumed run has yet to find.
+  double falls_in = 0;
   StageMemory memory;  ///< of ends that look back
   std::size_t stage_index = 0;
   std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]

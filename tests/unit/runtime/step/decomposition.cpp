@@ -46,7 +46,7 @@ TEST(Decomposition, HasTheSameBitsWithInnerChunksBehindTheExchange) {
 
 TEST(Decomposition, GivesTheForcesOfTheSequentialSolver) {
   // Frictionless and pressed from three sides: the forces on the walls and the energy are unique.
-  talus::Setup setup = pressed_box(0, 12);  // later on grains pass one another, or just do not
+  talus::Setup setup = pressed_box(0, 12);  // in later steps rounding decides whether two grains meet
   setup.solver.tolerance = 1e-6;
   setup.solver.balance_tolerance = 1e-5;
   setup.solver.max_iterations = 200000;
