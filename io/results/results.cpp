@@ -143,13 +143,14 @@ void cut_frames(const std::string& path, std::size_t kept) {
   detail::drop_directory(path);
 }
 
-/// Reads which arrays the frames have, those to be cut off included, as cutting walks through them. Throws
+/// Reads which arrays the file has, those of frames to be cut off, too, as cutting walks through them. Throws
 /// FileError where HDF5 cannot read that; the arrays are not read.
 void look_through(const std::string& path, std::size_t kept) {
   const Hdf5Object access = file_access(path);
   const Hdf5Object file =
       hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening the file");
   const Place root{file.id(), path};
+  detail::names_in(root, "walls");
   const std::vector<std::string> names = frames_of(root, kept);
   for (const std::string& name : names)
     for (const std::string& group : detail::names_in(root, "frames/" + name))

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <string_view>
+
 #include "io/scene/detail/scene_keys.hpp"
 #include "io/scene/detail/scene_text.hpp"
 #include "io/scene/scene.hpp"
@@ -10,8 +13,9 @@ using namespace detail;
 
 constexpr const char* introduction = R"(# Scenes
 
-A scene is one TOML file with everything a run depends on. Units are SI. This page is written by `talus scene-reference` from the
-table that reads the files, so it knows every key there is; a key that is not here is refused, with its line.
+A scene is one TOML file with everything a run depends on. Units are SI. This page is written by
+`talus scene-reference` from the table that reads the files, so it knows every key there is; a key that is not
+here is refused, with its line.
 
 ```toml
 time_step = 5e-4
@@ -38,12 +42,13 @@ end = { equilibrium = 1e-3, time = 2.0 }
 ```
 
 * Scenes to begin from stand in `apps/scenes/`.
-* `--set KEY=VALUE` changes a key for one run: `--set solver.tolerance=1e-4`. Elements of arrays go by number or by name:
-  `--set stage.0.time_step=1e-4`, `--set stage.shear.friction=0.5`, `--set wall.z+.pressure=2e4`,
+* `--set KEY=VALUE` changes a key for one run: `--set solver.tolerance=1e-4`. Elements of arrays go by number or
+  by name: `--set stage.0.time_step=1e-4`, `--set stage.shear.friction=0.5`, `--set wall.z+.pressure=2e4`,
   `--set stage.shear.load.z+.velocity='[0, 0, -0.1]'`.
-* The scene as it was run, with every default spelled out, is written beside the results as `scene.resolved.toml`. It is a scene
-  itself.
-* A mistake is reported with file, line and key, and with what was probably meant, before anything is written; the exit code is 2.
+* The scene as it was run, with every default spelled out, is written beside the results as
+  `scene.resolved.toml`. It is a scene itself.
+* A mistake is reported with file, line and key, and with what was probably meant, before anything is written;
+  the exit code is 2.
 )";
 
 /// Default of the key as the reference says it.
@@ -55,10 +60,30 @@ std::string default_text(const Key<Part>& key) {
   return text.empty() ? "none" : "`" + text + "`";
 }
 
+/// The text in lines of at most `width` characters; a blank in code may become the end of a line, which
+/// Markdown takes for a blank.
+std::string in_lines(std::string_view text, std::size_t width) {
+  std::string out;
+  std::size_t used = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find(' '), text.size());
+    const std::string_view word = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    // Bytes that go on with a character of UTF-8 begin with the bits 10.
+    const auto length = static_cast<std::size_t>(std::ranges::count_if(
+        word, [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) != 0x80; }));
+    const bool fits = used + 1 + length <= width;
+    if (used > 0) out += fits ? ' ' : '\n';
+    used = used > 0 && fits ? used + 1 + length : length;
+    out += word;
+  }
+  return out;
+}
+
 template <class Part>
 std::string section_text(const Section<Part>& section) {
   std::string out = fmt::format("\n## {}\n\n", section.header.empty() ? "Top" : "`" + section.header + "`");
-  if (!section.meaning.empty()) out += section.meaning + "\n\n";
+  if (!section.meaning.empty()) out += in_lines(section.meaning, 110) + "\n\n";
   out += "| key | type | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |\n";
   for (const Key<Part>& key : section.keys)
     out += fmt::format("| `{}` | {} | {} | {} | {} | {}{} |\n", key.name, type_text(key), key.unit,

@@ -55,8 +55,7 @@ void demand_grains_outside(const Stage& stage, const std::string& step, const St
     if (all.depth > 0)
       throw RunawayError(fmt::format(
           "{}: wall '{}' appears where grains are: the centre of grain {}, or of a ball of it, lies {:.6g} m "
-          "inside its solid, from where no contact would push it out. Remove such grains as the stage "
-          "begins, "
+          "inside its solid, from where no contact would push it out. Remove such grains as the stage begins "
           "or before ([[remove]]), or let the wall appear in another place",
           step, wall.name, all.body, all.depth));
   }

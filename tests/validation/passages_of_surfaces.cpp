@@ -3,9 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "runtime/graph/pretend_ranks.hpp"
 #include "runtime/step/runaway.hpp"
 #include "tests/unit/mesh_makers.hpp"
 #include "tests/validation/clump_scenes.hpp"
@@ -80,7 +83,7 @@ TEST(Surfaces, OfAThickSolidTellOfABodyThatEndsDeepInIt) {
 }
 
 /// A surface that appears in the second stage, where a dumbbell is, and a sphere.
-Experiment appear(const std::string& shape, ShapeNumbers numbers, std::vector<Triangle> triangles) {
+ClumpScene appearing(const std::string& shape, ShapeNumbers numbers, std::vector<Triangle> triangles) {
   ClumpScene scene(step_length);
   scene.surface(shape, std::move(numbers), std::move(triangles));
   scene.setup.walls.back().from_stage = "second";
@@ -89,38 +92,67 @@ Experiment appear(const std::string& shape, ShapeNumbers numbers, std::vector<Tr
   scene.setup.stages.back().name = "second";
   scene.dumbbell(Vec3(0, 0, 1));
   scene.sphere(Vec3::Zero(), r, mass);
-  return Experiment(std::move(scene));
+  return scene;
 }
 
-/// Steps of both stages; the message of what ends them.
-std::string ended_by(Experiment run) {
-  try {
-    run.steps(2);
-    run.next_stage();
-    run.steps(2);
-  } catch (const RunawayError& error) {
-    return error.what();
-  }
-  return "";
+/// Steps of both stages on so many ranks, a subdomain each; the message of what ends them.
+std::string ended_by(ClumpScene scene, int ranks = 1) {
+  scene.setup.decomposition.subdomains = ranks;
+  std::string message;
+  std::mutex adding;
+  graph::on_pretend_ranks(ranks, [&](const graph::Communicator& world) {
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(scene.setup, world.rank() == 0 ? scene.bodies : Bodies{}, executor, world);
+    try {
+      for (int step = 0; step < 4; ++step, simulation.begin_next_stage()) simulation.step();
+    } catch (const RunawayError& error) {
+      const std::lock_guard lock(adding);
+      EXPECT_TRUE(message.empty() || message == error.what()) << "ranks disagree";
+      message = error.what();
+    }
+  });
+  return message;
+}
+
+std::vector<Triangle> box(double low, double high) {
+  return test::box_mesh({-1, -1, low}, {1, 1, high});
 }
 
 TEST(Surfaces, ThatAppearAroundACentreOutOfWhichNoContactLeadsEndTheRun) {
-  const auto box = [](double low, double high) { return test::box_mesh({-1, -1, low}, {1, 1, high}); };
-  const std::string of_sphere = ended_by(appear("mesh", {}, box(-0.5, 0.5)));
+  const std::string of_sphere = ended_by(appearing("mesh", {}, box(-0.5, 0.5)));
   EXPECT_NE(of_sphere.find("step 3 (stage 'second'): wall 'mesh' appears"), std::string::npos) << of_sphere;
   EXPECT_NE(of_sphere.find("grain 1, or of a ball of it, lies 0.5 m inside"), std::string::npos) << of_sphere;
-  const std::string of_clump = ended_by(appear("mesh", {}, box(0.75, 1.25)));
+  const std::string of_clump = ended_by(appearing("mesh", {}, box(0.75, 1.25)));
   EXPECT_NE(of_clump.find("grain 0, or of a ball of it, lies 0.25 m inside"), std::string::npos) << of_clump;
   // Of a container, in whose solid all that is outside lies, only what it meets counts.
-  const std::string of_container = ended_by(appear("mesh", {{"inside", {1}}}, box(-2, 0.9375)));
+  const std::string of_container = ended_by(appearing("mesh", {{"inside", {1}}}, box(-2, 0.9375)));
   EXPECT_NE(of_container.find("grain 0, or of a ball of it, lies 0.0625 m inside"), std::string::npos)
       << of_container;
-  EXPECT_EQ(ended_by(appear("mesh", {{"inside", {1}}}, box(-0.5, 0.5))), "");
+  EXPECT_EQ(ended_by(appearing("mesh", {{"inside", {1}}}, box(-0.5, 0.5))), "");
   // One that cuts into a sphere pushes it, and says how deep.
-  EXPECT_EQ(ended_by(appear("mesh", {}, box(-0.5, -0.0625))), "");
+  EXPECT_EQ(ended_by(appearing("mesh", {}, box(-0.5, -0.0625))), "");
   // A cylinder has contacts with what lies in it.
-  EXPECT_EQ(ended_by(appear("cylinder", {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {0.5}}}, {})),
-            "");
+  EXPECT_EQ(
+      ended_by(appearing("cylinder", {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {0.5}}}, {})),
+      "");
+}
+
+TEST(Surfaces, ThatAppearAreToldOfAlikeOnAnyRanks) {
+  for (const auto& [low, high] : {std::pair(-0.5, 0.5), std::pair(0.75, 1.25), std::pair(-0.5, 1.25)}) {
+    const std::string alone = ended_by(appearing("mesh", {}, box(low, high)));
+    EXPECT_NE(alone, "") << low;
+    EXPECT_EQ(ended_by(appearing("mesh", {}, box(low, high)), 2), alone) << low;
+  }
+}
+
+TEST(Surfaces, ThatAppearFindWhatIsRemovedWithTheStageGone) {
+  ClumpScene scene = appearing("mesh", {}, box(-0.5, 0.5));
+  RemoveRule& rule = scene.setup.removes.emplace_back();
+  rule.name = "dig";
+  rule.region.low = Vec3::Constant(-0.5);
+  rule.region.high = Vec3::Constant(0.5);
+  rule.times.stage = "second";
+  EXPECT_EQ(ended_by(scene), "");
 }
 
 }  // namespace

@@ -201,18 +201,21 @@ TEST_F(ResumeRefusals, OfStatesThatAreMissingOrDamaged) {
     const Outcome outcome = run(line);
     EXPECT_EQ(outcome.code, 2) << what << outcome.messages;
     EXPECT_NE(outcome.messages.find("results.h5"), std::string::npos) << what << outcome.messages;
-    EXPECT_EQ(files_below(at("out")), before) << what;
+    EXPECT_TRUE(files_below(at("out")) == before) << what;
   };
   fs::remove(at("out/results.h5"));
   refused("missing");
   write(at("out/results.h5"), whole.substr(0, whole.size() / 2));
   refused("cut off");
-  // The directory of a group begins with SNOD: none of the first frame can be found any more.
-  std::string damaged = whole;
-  for (std::size_t at = damaged.find("SNOD"); at != std::string::npos; at = damaged.find("SNOD", at))
-    damaged.replace(at, 4, "snod");
-  write(at("out/results.h5"), damaged);
-  refused("damaged");
+  // The names in a group stand behind SNOD: those of a frame, of its bodies, its contacts and its walls.
+  int groups = 0;
+  for (std::size_t found = whole.find("SNOD"); found != std::string::npos;
+       found = whole.find("SNOD", found + 1)) {
+    write(at("out/results.h5"), std::string(whole).replace(found, 4, "snod"));
+    refused("damaged");
+    ++groups;
+  }
+  EXPECT_GE(groups, 6);
   write(at("out/results.h5"), whole);
   EXPECT_EQ(run(line).code, 0);
 }

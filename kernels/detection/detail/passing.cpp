@@ -5,15 +5,17 @@
 
 namespace talus::detail {
 
-bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius) {
+bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius,
+                    const SurfaceLooks& looks) {
   if (!came_far(way, radius)) return false;
   std::vector<SurfacePoint> points;
-  constexpr double most = 256;  // looks
-  const double length = way.norm(), looks = std::ceil(std::min(most, 4 * length / radius));
+  const double length = way.norm(),
+               count = std::ceil(std::min(looks.most, looks.per_radius * length / radius));
   // Where looks lie far apart they reach to one another, and to where the way began.
-  const double deep = std::max(0.5 * radius, length / looks), last = deep > 0.5 * radius ? looks : looks - 1;
+  const double apart = length / count, deep = std::max(looks.deep * radius, apart);
+  const double last = deep == apart ? count : count - 1;
   for (double look = 0; look <= last && points.empty(); ++look)
-    collide(wall, x - look / looks * way, deep, points);
+    collide(wall, x - look / count * way, deep, points);
   return !points.empty();
 }
 
