@@ -33,16 +33,18 @@ struct Start {
   Frame before;
   std::vector<Wall> walls;
   Stage stage;
+  std::size_t stage_index;
 };
 
 Start start_of(const Simulation& simulation) {
-  return {simulation.frame(false), simulation.state().walls, simulation.stage()};
+  return {simulation.frame(false), simulation.state().walls, simulation.stage(), simulation.stage_index()};
 }
 
-/// With Moreau's law the step's problem is one of mean velocities, (V + E V-)/(1 + E).
-Frame mean_of_impact(double E, const Frame& before, const Frame& after) {
+/// In the terms of the problem: with Moreau's law it is one of mean velocities, (V + E V-)/(1 + E).
+Frame mean_of_impact(double E, const Frame& before, const Frame& after, const CellEnd& cell) {
   Frame mean = after;
-  for (std::size_t k = 0; k < mean.u.size(); ++k) mean.u[k] = (after.u[k] + E * before.u[k]) / (1 + E);
+  for (std::size_t k = 0; k < mean.u.size(); ++k)
+    mean.u[k] = cell.u.empty() ? Vec3((after.u[k] + E * before.u[k]) / (1 + E)) : cell.u[k];
   for (std::size_t w = 0; w < mean.walls.size(); ++w)
     mean.walls[w].velocity = (after.walls[w].velocity + E * before.walls[w].velocity) / (1 + E);
   return mean;
@@ -56,13 +58,16 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   clusters_of(problem, clusters);
   step.clusters = static_cast<std::int64_t>(clusters);
   const RunImpulses run = impulses_of(problem, after);
-  const Frame mean = mean_of_impact(problem.reflection, start.before, after);
-  const StepEnd end{mean, run.r};
-  const double apart = disagreement(problem, end);
-  if (run.unknown > 0 || apart > rounding) {
+  CellEnd cell;
+  if (problem.cell.repeats)
+    cell = end_in_cell(problem.cell, start.stage.time_step, problem.reflection, start.before, after);
+  const Frame mean = mean_of_impact(problem.reflection, start.before, after, cell);
+  const StepEnd end{mean, run.r, cell.gained};
+  step.unexplained = disagreement(problem, end);
+  if (run.unknown > 0 || step.unexplained > rounding) {
     step.judged = Judged::other_problem;
-    step.why =
-        fmt::format("{} contacts unknown to the audit, momentum unexplained {:.1e}", run.unknown, apart);
+    step.why = fmt::format("{} contacts unknown to the audit, momentum unexplained {:.1e}", run.unknown,
+                           step.unexplained);
     return;
   }
   ReferenceLimits own = limits;
@@ -91,12 +96,15 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
     const SolverSettings& solver = scene.setup.solver;
     graph::Executor executor({.threads = 1});
     Simulation simulation(scene.setup, bodies, executor);
+    double stage_began = 0;
     while (!simulation.finished() && static_cast<std::int64_t>(run.steps.size()) < plan.steps) {
-      const Start start = start_of(simulation);
+      Start start = start_of(simulation);
+      if (simulation.steps_of_stage() == 0) stage_began = start.before.time;
       const auto run_start = Clock::now();
       const StepReport& report = simulation.step();
       AuditedStep step;
       step.run_seconds = seconds_since(run_start);
+      start.stage.time_step = report.time_step;  // of stages that choose that of each step
       step.step = report.step;
       step.certified = report.converged;
       step.overlapping = !(report.overlap <= scene.setup.solver.overlap_tolerance);
@@ -110,7 +118,8 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       std::vector<double> loads;
       for (const WallState& wall : simulation.state().wall_states) loads.push_back(wall.applied);
       const StepProblem problem =
-          rebuild_step({start.before, start.walls, loads, start.stage, bodies, scene.setup});
+          rebuild_step({start.before, start.walls, loads, start.stage, bodies, scene.setup, start.stage_index,
+                        start.before.time - stage_began});
       judge(problem, start, after, plan.limits, step);
       step.audit_seconds = seconds_since(audit_start);
       run.steps.push_back(std::move(step));

@@ -33,6 +33,7 @@ struct AuditedStep {
   int iterations = 0;
   Judged judged = Judged::no_reference;
   std::string why;           ///< where it is not judged
+  double unexplained = 0;    ///< disagreement() of the run with the problem
   bool forces_known = true;  ///< where judged; else forces are over-determined, velocities are not
   TrueErrors errors;
   double residual = 0, uncertainty = 0;  ///< of the reference

@@ -1,6 +1,6 @@
 #include "apps/study_certificate/friction_newton.hpp"
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 #include <Eigen/SparseLU>
 
 #include <algorithm>
@@ -46,11 +46,20 @@ void add_body(Triplets& entries, std::size_t c, Eigen::Index column, const Eigen
       if (block(i, j) != 0) entries.emplace_back(row_of(c) + i, column + j, block(i, j));
 }
 
+/// x = J^-1 x.
+bool solve_in_place(const Eigen::SparseMatrix<double>& J, Eigen::VectorXd& x) {
+  const Eigen::SparseLU<Eigen::SparseMatrix<double>> factor(J);
+  if (factor.info() != Eigen::Success) return false;
+  x = factor.solve(x).eval();
+  return x.allFinite();
+}
+
 }  // namespace
 
 FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
   const std::size_t contacts = problem.contacts.size(), grains = problem.mass.size();
   Triplets entries;
+  cell_.setZero(row_of(contacts), problem.cell.follows() ? 6 : 0);
   scale_.resize(row_of(contacts));
   q_.resize(row_of(contacts));
   for (std::size_t c = 0; c < contacts; ++c) {
@@ -75,6 +84,15 @@ FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
       entries.emplace_back(row_of(c), static_cast<Eigen::Index>(6 * grains + contact.wall()),
                            -std::sqrt(inv_mass));
     }
+    if (problem.cell.follows() && !contact.at_wall()) {
+      const double of_cell = cell_mobility(problem.cell, contact.branch);
+      normal += of_cell;
+      tangential += of_cell;
+      for (Eigen::Index k = 0; k < 6; ++k)
+        cell_.block<3, 1>(row_of(c), k) =
+            std::sqrt(problem.cell.mobility[k]) *
+            (frame.transpose() * stretched(CellVector::Unit(k), contact.branch));
+    }
     scale_.segment<3>(row_of(c)) << 1 / std::sqrt(normal), 1 / std::sqrt(tangential),
         1 / std::sqrt(tangential);
     q_.segment<3>(row_of(c)) =
@@ -88,6 +106,7 @@ FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
   H.setFromTriplets(entries.begin(), entries.end());
   H = scale_.asDiagonal() * H;
   W_ = H * Matrix(H.transpose());
+  cell_ = (scale_.asDiagonal() * cell_).eval();
 }
 
 FrictionNewton::Vector FrictionNewton::scaled(std::span<const Vec3> r) const {
@@ -104,7 +123,7 @@ std::vector<Vec3> FrictionNewton::unscaled(const Vector& s) const {
 }
 
 FrictionNewton::Vector FrictionNewton::law(const Vector& s, const Vector& centre, double shift) const {
-  const Vector z = s - (W_ * s + q_ + shift * (s - centre));
+  const Vector z = s - (times_w(s) + q_ + shift * (s - centre));
   Vector F = s;
   for (std::size_t c = 0; c < frame_.size(); ++c) {
     const Eigen::Index k = row_of(c);
@@ -140,9 +159,32 @@ void FrictionNewton::derivative(const Vector& z, std::size_t c, Eigen::Matrix3d&
   }
 }
 
+bool FrictionNewton::solve_with_cell(const Matrix& J, const Matrix& P, const Matrix& S, Vector& x) const {
+  constexpr int refinements = 4;
+  constexpr double enough = 1e-9;
+  const Eigen::MatrixXd back = S * cell_, there = P * back;
+  const Vector right = x;
+  const Eigen::SparseLU<Matrix> factor(J);
+  if (factor.info() == Eigen::Success) {
+    const Eigen::MatrixXd beside = factor.solve(there);
+    const Eigen::PartialPivLU<Eigen::MatrixXd> small(Eigen::MatrixXd::Identity(back.cols(), back.cols()) +
+                                                     back.transpose() * beside);
+    x.setZero();
+    for (int k = 0; k < refinements; ++k) {
+      const Vector left = right - J * x - there * (back.transpose() * x);
+      if (k > 0 && left.norm() <= enough * right.norm()) return x.allFinite();
+      const Vector alone = factor.solve(left);
+      x += alone - beside * small.solve(back.transpose() * alone);
+    }
+  }
+  const Eigen::PartialPivLU<Eigen::MatrixXd> whole(Eigen::MatrixXd(J) + there * back.transpose());
+  x = whole.solve(right);
+  return x.allFinite();
+}
+
 bool FrictionNewton::step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const {
   const auto& [centre, shift] = near;
-  const Vector z = s - (W_ * s + q_ + shift * (s - centre));
+  const Vector z = s - (times_w(s) + q_ + shift * (s - centre));
   const auto size = s.size();
   // Open contacts lose their impulses, which leaves a system of those that carry.
   std::vector<Eigen::Index> place(static_cast<std::size_t>(size), -1);
@@ -174,11 +216,8 @@ bool FrictionNewton::step(const Vector& s, const Vector& F, const Near& near, Ve
   Vector open = ds;
   for (Eigen::Index k = 0; k < size; ++k)
     if (place[static_cast<std::size_t>(k)] >= 0) open[k] = 0;
-  const Vector right = -(S * F) - P * (SW * open);
-  Eigen::SparseLU<Matrix> factor(J);
-  if (factor.info() != Eigen::Success) return false;
-  const Vector part = factor.solve(right);
-  if (!part.allFinite()) return false;
+  Vector part = -(S * F) - P * (S * times_w(open));
+  if (cell_.cols() > 0 ? !solve_with_cell(J, P, S, part) : !solve_in_place(J, part)) return false;
   ds = open + S.transpose() * part;
   return true;
 }
@@ -226,8 +265,8 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) con
   Vector ds;
   if (step(s, law(s, s, 0), {s, least_shift}, ds)) {
     result.exchanged =
-        std::max(std::sqrt(std::max(0.0, s.dot(W_ * s))), floor_of_exchange * s.cwiseAbs().maxCoeff());
-    result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds)));
+        std::max(std::sqrt(std::max(0.0, s.dot(times_w(s)))), floor_of_exchange * s.cwiseAbs().maxCoeff());
+    result.next = std::sqrt(std::max(0.0, ds.dot(times_w(ds))));
   }
   r = unscaled(s);
   return result;
@@ -249,7 +288,7 @@ bool FrictionNewton::go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r,
 
 double FrictionNewton::apart(std::span<const Vec3> a, std::span<const Vec3> b) const {
   const Vector s = scaled(a) - scaled(b);
-  return std::sqrt(std::max(0.0, s.dot(W_ * s)));
+  return std::sqrt(std::max(0.0, s.dot(times_w(s))));
 }
 
 }  // namespace talus::audit

@@ -55,10 +55,14 @@ class FrictionNewton {
     double shift;
   };
 
+  Vector times_w(const Vector& s) const { return W_ * s + cell_ * (cell_.transpose() * s); }
   Vector scaled(std::span<const Vec3> r) const;
   std::vector<Vec3> unscaled(const Vector& s) const;
   Vector law(const Vector& s, const Vector& centre, double shift) const;
   void derivative(const Vector& z, std::size_t c, Eigen::Matrix3d& D) const;
+  /// x = (J + P S cell (S cell)^T)^-1 x, S what selects the contacts that carry: by Woodbury's formula, which
+  /// the stress that a packing holds by itself may leave without digits, and then with all of the matrix.
+  bool solve_with_cell(const Matrix& J, const Matrix& P, const Matrix& S, Vector& x) const;
   /// A Newton step; false when its system has no solution.
   bool step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const;
   /// Solves the problem around a centre to |F| <= enough.
@@ -68,7 +72,8 @@ class FrictionNewton {
   std::vector<double> friction_;        ///< in scaled coordinates
   Vector scale_, q_;                    ///< 3 per contact
   double least_unit_ = 1e-300;
-  Matrix W_;
+  Matrix W_;              ///< without what the cell adds, cell_ cell_^T
+  Eigen::MatrixXd cell_;  ///< a column per component that follows a stress: it ties all contacts together
 };
 
 }  // namespace talus::audit

@@ -40,6 +40,7 @@ std::vector<Part> split(const StepProblem& whole, std::span<const Vec3> run) {
     part.problem.wall_normal = whole.wall_normal;
     part.problem.wall_inv_mass = whole.wall_inv_mass;
     part.problem.wall_load = whole.wall_load;
+    part.problem.cell = whole.cell;
   }
   for (std::size_t c = 0; c < whole.contacts.size(); ++c) {
     Part& part = parts[cluster[c]];
@@ -63,13 +64,15 @@ std::vector<Part> split(const StepProblem& whole, std::span<const Vec3> run) {
 }  // namespace
 
 std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count) {
-  const std::size_t grains = problem.mass.size(), bodies = grains + problem.wall_normal.size();
+  const std::size_t grains = problem.mass.size(), cell = grains + problem.wall_normal.size(),
+                    bodies = cell + 1;
   std::vector<std::size_t> parent(bodies);
   std::iota(parent.begin(), parent.end(), std::size_t{0});
   for (const StepContact& contact : problem.contacts) {
     if (contact.at_wall() && problem.wall_inv_mass[contact.wall()] == 0) continue;
     const std::size_t other = contact.at_wall() ? grains + contact.wall() : contact.other();
     parent[root_of(parent, other)] = root_of(parent, contact.first);
+    if (problem.cell.follows() && !contact.at_wall()) parent[root_of(parent, cell)] = root_of(parent, other);
   }
   std::vector<std::size_t> number(bodies, bodies), cluster;
   count = 0;

@@ -28,6 +28,7 @@ struct ReferenceLimits {
   double motion = 1e-9;     ///< least exchange, over what all bodies have, kinetic norm: below it is rounding
   double speeds = 1e-4;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
+  int pivots_in_cell = 60;  ///< ... of a cell, before an interior point method makes a guess
   int proximal_steps = 24;  ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
   std::int64_t walk_solves =
@@ -59,7 +60,8 @@ struct Reference {
   double uncertainty() const { return exchanged > 0 ? error / exchanged : 0; }
 };
 
-/// Number of the cluster of each contact: contacts that share a grain or a pushed wall are of one. `count`:
+/// Number of the cluster of each contact: contacts that share a grain or a pushed wall are of one, and
+/// so are all between grains of a cell that follows a stress. `count`:
 /// how many there are.
 std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count);
 

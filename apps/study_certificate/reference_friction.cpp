@@ -45,6 +45,9 @@ class Sweeps {
       } else {
         m.normal += 1 / problem.mass[contact.other()];
         m.tangential += 1 / problem.mass[contact.other()] + problem.spin_mobility[contact.other()];
+        const double of_cell = cell_mobility(problem.cell, contact.branch);
+        m.normal += of_cell;
+        m.tangential += of_cell;
       }
       mobility_.push_back(m);
     }
@@ -83,21 +86,8 @@ class Sweeps {
     const StepContact& contact = problem_.contacts[c];
     const Vec3 now = at(r, c);
     const Vec3 next = answer(c, now, relative_velocity(contact, motion_));
-    const Vec3 change = next - now;
     at(r, c) = next;
-    const Vec3 turn = contact.normal.cross(change);
-    const std::size_t i = contact.first;
-    motion_.u[i] += change / problem_.mass[i];
-    motion_.w[i] -= problem_.spin_mobility[i] * turn;
-    if (contact.at_wall()) {
-      const std::size_t w = contact.wall();
-      const Vec3& n = problem_.wall_normal[w];
-      motion_.walls[w] -= problem_.wall_inv_mass[w] * change.dot(n) * n;
-    } else {
-      const std::size_t j = contact.other();
-      motion_.u[j] -= change / problem_.mass[j];
-      motion_.w[j] -= problem_.spin_mobility[j] * turn;
-    }
+    add_impulse(problem_, contact, next - now, motion_);
   }
 
   const StepProblem& problem_;

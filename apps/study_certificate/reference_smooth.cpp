@@ -1,3 +1,4 @@
+#include <Eigen/Dense>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
@@ -15,6 +16,7 @@ namespace {
 using Real = long double;
 using Matrix = Eigen::SparseMatrix<Real>;
 using Vector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+using Dense = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 using Rows = std::vector<Eigen::Index>;
 
 /// Part of W's diagonal that is added in a proximal step: the first one, and the least. It decides among
@@ -32,9 +34,12 @@ constexpr Real floor_of_exchange = 1e-2L;
 
 /// The dual problem, in impulses times sqrt(W_cc): y = W s + q, s >= 0, y >= 0, s.y = 0, diagonal of W 1.
 struct Dual {
-  Matrix W;
+  Matrix W;    ///< without what a cell that follows a stress adds, cell cell^T
+  Dense cell;  ///< a column per component of its flow: it ties all contacts together
   Vector q;
   Vector scale;  ///< s_c = r_n / scale_c, with scale_c = W_cc^-1/2
+
+  Vector times_w(const Vector& s) const { return W * s + cell * (cell.transpose() * s); }
 };
 
 Dual dual_of(const StepProblem& problem) {
@@ -44,6 +49,7 @@ Dual dual_of(const StepProblem& problem) {
   Dual dual;
   dual.q.resize(contacts);
   dual.scale.resize(contacts);
+  dual.cell.setZero(contacts, problem.cell.follows() ? 6 : 0);
   std::vector<Eigen::Triplet<Real>> entries;
   for (Eigen::Index c = 0; c < contacts; ++c) {
     const StepContact& contact = problem.contacts[static_cast<std::size_t>(c)];
@@ -60,14 +66,21 @@ Dual dual_of(const StepProblem& problem) {
     else if (problem.wall_inv_mass[contact.wall()] > 0)
       row.emplace_back(c, 3 * grains + static_cast<Eigen::Index>(contact.wall()),
                        -std::sqrt(static_cast<Real>(problem.wall_inv_mass[contact.wall()])));
-    Real square = 0;
+    if (problem.cell.follows() && !contact.at_wall()) {
+      const CellVector push = push_on_cell(contact.normal, contact.branch);
+      for (Eigen::Index k = 0; k < 6; ++k)
+        dual.cell(c, k) = std::sqrt(static_cast<Real>(problem.cell.mobility[k])) * static_cast<Real>(push[k]);
+    }
+    Real square = dual.cell.row(c).squaredNorm();
     for (const auto& entry : row) square += entry.value() * entry.value();
     dual.scale[c] = 1 / std::sqrt(square);
+    dual.cell.row(c) *= dual.scale[c];
     for (const auto& entry : row) entries.emplace_back(c, entry.col(), entry.value() * dual.scale[c]);
     // In 80 bits from the start: b and v_free nearly cancel at a contact that hardly moves.
     Eigen::Matrix<Real, 3, 1> v = problem.free.u[contact.first].cast<Real>();
     v -= (contact.at_wall() ? problem.free.walls[contact.wall()] : problem.free.u[contact.other()])
              .cast<Real>();
+    v -= contact.drift.cast<Real>();
     dual.q[c] = dual.scale[c] * (contact.normal.cast<Real>().dot(v) + static_cast<Real>(contact.bias));
   }
   Matrix G(contacts, 3 * grains + walls);
@@ -79,8 +92,12 @@ Dual dual_of(const StepProblem& problem) {
 /// Solves y = (W + shift) s + q, s >= 0 only on the rows of `carry`, y >= 0 elsewhere.
 class Pivots {
  public:
-  Pivots(const Matrix& W, const Vector& q, Real shift, int most)
-      : W_(W), q_(q), shift_(shift), most_(most), place_(Rows(static_cast<std::size_t>(q.size()), -1)) {}
+  Pivots(const Dual& dual, const Vector& q, Real shift, int most)
+      : dual_(dual),
+        q_(q),
+        shift_(shift),
+        most_(most),
+        place_(Rows(static_cast<std::size_t>(q.size()), -1)) {}
 
   /// `carry` in: a guess; out: the contacts that carry. False when the pivots do not end.
   bool solve(std::vector<char>& carry, Vector& s) {
@@ -128,24 +145,44 @@ class Pivots {
     for (Eigen::Index k = 0; k < size; ++k) {
       const Eigen::Index c = rows_[static_cast<std::size_t>(k)];
       right[k] = -q_[c];
-      for (Matrix::InnerIterator at(W_, c); at; ++at) {
+      for (Matrix::InnerIterator at(dual_.W, c); at; ++at) {
         const Eigen::Index row = place_[static_cast<std::size_t>(at.row())];
         if (row >= k) entries.emplace_back(row, k, at.value() + (row == k ? shift_ : 0));
       }
     }
     Matrix block(size, size);
     block.setFromTriplets(entries.begin(), entries.end());
-    Eigen::SimplicialLDLT<Matrix, Eigen::Lower> factor(block);
-    if (factor.info() != Eigen::Success) return false;
-    Vector part = factor.solve(right);
-    part += factor.solve(right - block.selfadjointView<Eigen::Lower>() * part);
+    Vector part;
+    if (dual_.cell.cols() > 0 ? !solve_with_cell(block, right, part) : !solve_block(block, right, part))
+      return false;
     for (Eigen::Index k = 0; k < size; ++k) s[rows_[static_cast<std::size_t>(k)]] = part[k];
+    return true;
+  }
+
+  static bool solve_block(const Matrix& block, const Vector& right, Vector& part) {
+    const Eigen::SimplicialLDLT<Matrix, Eigen::Lower> factor(block);
+    if (factor.info() != Eigen::Success) return false;
+    part = factor.solve(right);
+    part += factor.solve(right - block.selfadjointView<Eigen::Lower>() * part);
+    return true;
+  }
+
+  /// A dense block, as the cell ties all contacts together.
+  bool solve_with_cell(const Matrix& block, const Vector& right, Vector& part) const {
+    Dense of_cell(right.size(), dual_.cell.cols());
+    for (Eigen::Index k = 0; k < right.size(); ++k)
+      of_cell.row(k) = dual_.cell.row(rows_[static_cast<std::size_t>(k)]);
+    const Dense all = Dense(block) + of_cell * of_cell.transpose();  // the lower half is right
+    const Eigen::LDLT<Dense, Eigen::Lower> factor(all);
+    if (factor.info() != Eigen::Success) return false;
+    part = factor.solve(right);
+    part += factor.solve(right - all.selfadjointView<Eigen::Lower>() * part);
     return true;
   }
 
   /// Contacts that carry and pull, and contacts that do not carry and close.
   Rows misplaced(const std::vector<char>& carry, const Vector& s) const {
-    const Vector y = W_ * s + q_;
+    const Vector y = dual_.times_w(s) + q_;
     const Real size = std::max(s.cwiseAbs().maxCoeff(), q_.cwiseAbs().maxCoeff());
     Rows wrong;
     for (Eigen::Index c = 0; c < q_.size(); ++c)
@@ -153,7 +190,7 @@ class Pivots {
     return wrong;
   }
 
-  const Matrix& W_;
+  const Dual& dual_;
   const Vector& q_;
   Real shift_;
   int most_;
@@ -166,7 +203,7 @@ struct Met {
   Real gap = 0;  ///< sum s |y|: |V - V*|^2 in the kinetic norm, where s stands for s* at contacts that close
 };
 Met met_by(const Dual& dual, const Vector& s) {
-  const Vector y = dual.W * s + dual.q;
+  const Vector y = dual.times_w(s) + dual.q;
   Met met;
   for (Eigen::Index c = 0; c < s.size(); ++c) {
     met.residual = std::max(met.residual, std::abs(s[c] - std::max<Real>(0, s[c] - y[c])));
@@ -175,16 +212,75 @@ Met met_by(const Dual& dual, const Vector& s) {
   return met;
 }
 
+/// The answer to y = (W + shift) s + q by an interior point method with predictor and corrector (Mehrotra
+/// 1992), which needs no guess of what carries: to about the digits that are left where s y has come down to
+/// `least` of its scale.
+Vector from_within(const Dual& dual, const Vector& q, Real shift) {
+  constexpr int most = 80;
+  constexpr Real least = 1e-26L, back = 0.99L;
+  const Eigen::Index count = q.size();
+  Dense W = Dense(dual.W) + dual.cell * dual.cell.transpose();
+  W.diagonal().array() += shift;
+  const Real scale = std::max(q.cwiseAbs().maxCoeff(), Real{1e-300L});
+  Vector s = Vector::Constant(count, scale), y = s;
+  const auto farthest = [](const Vector& at, const Vector& step) {
+    Real part = 1;
+    for (Eigen::Index c = 0; c < at.size(); ++c)
+      if (step[c] < 0) part = std::min(part, -at[c] / step[c]);
+    return part;
+  };
+  for (int step = 0; step < most; ++step) {
+    const Vector apart = W * s + q - y;
+    const Real gap = s.dot(y) / static_cast<Real>(count);
+    if (gap < least * scale * scale && apart.cwiseAbs().maxCoeff() < std::sqrt(least) * scale) break;
+    Dense system = W;
+    system.diagonal() += y.cwiseQuotient(s);
+    const Eigen::LDLT<Dense> factor(system);
+    const auto towards = [&](const Vector& products, Vector& ds, Vector& dy) {
+      ds = factor.solve(products.cwiseQuotient(s) - apart);
+      dy = (products - y.cwiseProduct(ds)).cwiseQuotient(s);
+    };
+    Vector ds, dy;
+    const Vector closed = -s.cwiseProduct(y);
+    towards(closed, ds, dy);
+    const Real part = std::min(farthest(s, ds), farthest(y, dy));
+    const Real ahead = (s + part * ds).dot(y + part * dy) / static_cast<Real>(count) / gap;
+    const Vector centred =
+        closed - ds.cwiseProduct(dy) + Vector::Constant(count, ahead * ahead * ahead * gap);
+    towards(centred, ds, dy);
+    if (!ds.allFinite() || !dy.allFinite()) break;
+    const Real way = std::min(Real{1}, back * std::min(farthest(s, ds), farthest(y, dy)));
+    s += way * ds;
+    y += way * dy;
+  }
+  for (Eigen::Index c = 0; c < count; ++c)
+    if (s[c] < y[c]) s[c] = 0;
+  return s;
+}
+
 /// Proximal steps from s, in and out, until the law is met to `enough`. False when pivots do not end.
 bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough, Vector& s) {
   std::vector<char> carry;
-  for (const Real value : s) carry.push_back(value > 0);
+  const auto guess = [&] {
+    carry.clear();
+    for (const Real value : s) carry.push_back(value > 0);
+  };
+  guess();
   Vector next;
   Real shift = first_shift, residual = met_by(dual, s).residual;
+  // Where a cell ties hundreds of contacts together pivots may go round in circles.
+  bool again = dual.cell.cols() > 0;
   for (int step = 0; step < limits.proximal_steps && residual > enough; ++step) {
     const Vector q = dual.q - shift * s;
-    if (!Pivots(dual.W, q, shift, limits.pivots).solve(carry, next)) return false;
-    s = next.cwiseMax(Real{0});
+    if (Pivots(dual, q, shift, again ? limits.pivots_in_cell : limits.pivots).solve(carry, next)) {
+      s = next.cwiseMax(Real{0});
+    } else if (again) {
+      again = false;
+      s = from_within(dual, dual.q, 0);
+      guess();
+    } else {
+      return false;
+    }
     residual = met_by(dual, s).residual;
     shift = std::max(least_shift, shift / 100);
   }
@@ -197,13 +293,18 @@ Vector next_to(const Dual& dual, const ReferenceLimits& limits, Real unit, const
                const Vector& answer) {
   std::vector<char> carry;
   for (const Real value : answer) carry.push_back(value > 0);
-  const auto kinetic2 = [&](const Vector& s) { return s.dot(dual.W * s); };
+  const auto kinetic2 = [&](const Vector& s) { return s.dot(dual.times_w(s)); };
   const Real apart2 = limits.forces_velocities * limits.forces_velocities *
                       std::max(kinetic2(answer),
                                floor_of_exchange * floor_of_exchange * answer.maxCoeff() * answer.maxCoeff());
   Vector next;
+  const bool in_cell = dual.cell.cols() > 0;
   for (Real shift = nearest_shift; shift >= least_shift; shift /= 10) {
-    if (!Pivots(dual.W, dual.q - shift * start, shift, limits.pivots).solve(carry, next)) return answer;
+    const Vector q = dual.q - shift * start;
+    if (!Pivots(dual, q, shift, in_cell ? limits.pivots_in_cell : limits.pivots).solve(carry, next)) {
+      if (!in_cell) return answer;
+      next = from_within(dual, q, shift);
+    }
     next = next.cwiseMax(Real{0}).eval();
     if (met_by(dual, next).residual <= limits.forces * unit && kinetic2(next - answer) <= apart2) return next;
   }
@@ -246,7 +347,7 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
   reference.residual = static_cast<double>(met.residual / unit);
   reference.error = static_cast<double>(std::sqrt(met.gap));
   reference.exchanged = static_cast<double>(
-      std::max(std::sqrt(std::max<Real>(0, s.dot(dual.W * s))), floor_of_exchange * s.maxCoeff()));
+      std::max(std::sqrt(std::max<Real>(0, s.dot(dual.times_w(s)))), floor_of_exchange * s.maxCoeff()));
   const auto impulses = [&](const Vector& of) {
     std::vector<Vec3> r;
     for (Eigen::Index c = 0; c < count; ++c)

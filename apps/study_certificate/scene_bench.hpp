@@ -22,6 +22,9 @@ class SceneBench {
   double speed = 0;  ///< [m/s] that grains have at the beginning
   int size;          ///< MakerSettings::size
   int steps;
+  /// Of a cell: flow, stress and time step of the first stage, and of the second one, behind a change of
+  /// loads. None between walls.
+  std::vector<Stage> cell_stages = {};
 
   int draw_count(int low, int high) { return size * draws.from_to(low, high); }  ///< of grains
   double weight() const;  ///< [N] of a usual grain; of one under 9.81 m/s^2 without gravity
@@ -61,5 +64,6 @@ void make_wedge(SceneBench& bench);
 void make_arch(SceneBench& bench);
 void make_rows(SceneBench& bench);
 void make_heavy(SceneBench& bench);
+void make_cell(SceneBench& bench);
 
 }  // namespace talus::audit

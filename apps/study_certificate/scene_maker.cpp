@@ -28,7 +28,8 @@ constexpr std::array families = {
     SceneFamily{"wedge", "grains in a V of half angle 1e-3 to 0.5", make_wedge},
     SceneFamily{"arch", "an arch, and loose grains", make_arch},
     SceneFamily{"rows", "rows of touching grains that run into one another", make_rows},
-    SceneFamily{"heavy", "heavy bodies on light ones", make_heavy}};
+    SceneFamily{"heavy", "heavy bodies on light ones", make_heavy},
+    SceneFamily{"cell", "grains in a periodic cell that follows a stress or a flow", make_cell}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;
@@ -40,8 +41,16 @@ double draw_time_step(SceneBench& bench) {
   return natural * draws.between_decades(1e-3, 0.1);
 }
 
+/// What moves the cell of a scene, in a stage.
+void take_flow(const Stage& flow, Stage& stage) {
+  stage.strain_rates = flow.strain_rates;
+  stage.shear_rates = flow.shear_rates;
+  stage.stress = flow.stress;
+}
+
 /// Loads of the second half of the steps.
 void change_loads(SceneBench& bench, Stage& stage) {
+  if (!bench.cell_stages.empty()) return take_flow(bench.cell_stages.back(), stage);
   Draws& draws = bench.draws;
   const Setup& setup = bench.made.scene.setup;
   const auto pushed =
@@ -66,8 +75,10 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   io::Scene& scene = bench.made.scene;
   Stage stage;
   stage.name = "first";
-  stage.time_step = draw_time_step(bench);
-  stage.gravity = {0, 0, -bench.gravity};
+  const bool in_cell = !bench.cell_stages.empty();
+  stage.time_step = in_cell ? bench.cell_stages.front().time_step : draw_time_step(bench);
+  stage.gravity = bench.gravity > 0 ? Vec3(0, 0, -bench.gravity) : Vec3(Vec3::Zero());
+  if (in_cell) take_flow(bench.cell_stages.front(), stage);
   const double friction = draws.chance(0.5) ? 0 : draws.between(0.1, 0.8);
   const double at_walls = draws.chance(0.7) ? friction : 0;
   const double restitution = draws.chance(0.6) ? 0 : draws.chance(0.2) ? 1 : draws.unit();
@@ -89,6 +100,13 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   solver.tolerance = solver.balance_tolerance = settings.tolerance;
   scene.setup.decomposition.subdomains = settings.subdomains;
   scene.setup.decomposition.coupling = settings.coupling;
+  if (in_cell) {  // where it follows a stress there is no other
+    scene.setup.decomposition.coupling = Coupling::nscdd;
+    solver.overlap_correction = 0;
+    // A stress presses together by and by what one long step has driven in, so that every step behind it
+    // would miss, and what is judged here are velocities and forces.
+    solver.overlap_tolerance = 0.5;
+  }
   scene.setup.seed = bench.made.seed;
   scene.samples.resize(1);
   scene.samples.front().kind = io::SampleSpec::Kind::bodies;

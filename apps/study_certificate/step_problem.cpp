@@ -76,7 +76,11 @@ class Builder {
     made_.gravity = in_.stage.gravity;
     take_grains();
     take_walls();
-    meet_grains();
+    take_cell();
+    if (made_.cell.repeats)
+      meet_images();
+    else
+      meet_grains();
     meet_walls();
     return std::move(made_);
   }
@@ -115,19 +119,41 @@ class Builder {
     }
   }
 
+  /// The cell, and what the change of its flow gives to every body.
+  void take_cell() {
+    made_.cell = cell_of_step(in_, made_.mass, numbers_.E);
+    const StepCell& cell = made_.cell;
+    if (!cell.repeats) return;
+    for (std::size_t k = 0; k < n_; ++k) made_.free.u[k] += cell.gain * (middle_[k] - cell.low);
+    made_.drive_speed = std::max(made_.drive_speed, cell.drive);
+    // Images are as far away as the edges.
+    const double farthest = cell.edges.cwiseAbs().maxCoeff() * std::numeric_limits<double>::epsilon();
+    made_.rounding_speed = std::max(made_.rounding_speed, farthest / numbers_.h);
+  }
+
   const PairLaw& law(Material a, Material b) const { return in_.stage.laws.between(a, b); }
 
   void meet(std::size_t i, std::size_t j) {
-    const Vec3 d = middle_[i] - middle_[j];
+    const StepCell& cell = made_.cell;
+    const Vec3 apart = middle_[i] - middle_[j], k = cell.edges_between(apart),
+               d = cell.repeats ? Vec3(apart - cell.edges * k) : apart;
     const double distance = d.norm();
     const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3(Vec3::UnitZ());
-    const double v_n = normal.dot(in_.before.u[i] - in_.before.u[j]);
+    const double v_n = normal.dot(in_.before.u[i] - in_.before.u[j] - cell.rates * k);
     const PairLaw& pair = law(material_[i], material_[j]);
     double bias = 0;
     if (!meets(numbers_, {distance - in_.before.radius[i] - in_.before.radius[j], v_n, v_n}, pair.restitution,
                bias))
       return;
-    made_.contacts.push_back({i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction});
+    const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
+    made_.contacts.push_back(
+        {i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction, drift, d / cell.length});
+  }
+
+  /// All pairs of a cell: an image may be anywhere.
+  void meet_images() {
+    for (std::size_t i = 0; i < n_; ++i)
+      for (std::size_t j = 0; j < i; ++j) meet(i, j);
   }
 
   /// Sort and sweep along the longest axis of the sample.
@@ -164,9 +190,12 @@ class Builder {
                                 wall.normal.dot(in_.before.u[i] - wall.velocity),
                                 wall.normal.dot(in_.before.u[i] - wall.velocity + gained)};
         double bias = 0;
-        if (meets(numbers_, approach, pair.restitution, bias))
-          made_.contacts.push_back(
-              {i, -1 - static_cast<std::ptrdiff_t>(w), wall.normal, bias, pair.friction});
+        if (!meets(numbers_, approach, pair.restitution, bias)) continue;
+        // In a cell the material of a wall goes with the flow, in its plane.
+        const StepCell& cell = made_.cell;
+        const Vec3 drift = (cell.before + cell.gain) * (middle_[i] - cell.low);
+        made_.contacts.push_back(
+            {i, -1 - static_cast<std::ptrdiff_t>(w), wall.normal, bias, pair.friction, drift});
       }
     }
   }
@@ -191,32 +220,36 @@ StepProblem rebuild_step(const StepInput& input) {
   return Builder(input).build();
 }
 
+void add_impulse(const StepProblem& problem, const StepContact& contact, const Vec3& r, Motion& motion) {
+  const Vec3 turn = contact.normal.cross(r);
+  motion.u[contact.first] += r / problem.mass[contact.first];
+  motion.w[contact.first] -= problem.spin_mobility[contact.first] * turn;
+  if (contact.at_wall()) {
+    const std::size_t w = contact.wall();
+    const Vec3& n = problem.wall_normal[w];
+    motion.walls[w] -= problem.wall_inv_mass[w] * r.dot(n) * n;
+    return;
+  }
+  motion.u[contact.other()] -= r / problem.mass[contact.other()];
+  motion.w[contact.other()] -= problem.spin_mobility[contact.other()] * turn;
+  if (problem.cell.follows())
+    motion.cell += problem.cell.mobility.cwiseProduct(push_on_cell(r, contact.branch));
+}
+
 Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses) {
   Motion motion = problem.free;
-  for (std::size_t c = 0; c < impulses.size(); ++c) {
-    const StepContact& contact = problem.contacts[c];
-    const Vec3& r = impulses[c];
-    const Vec3 turn = contact.normal.cross(r);
-    motion.u[contact.first] += r / problem.mass[contact.first];
-    motion.w[contact.first] -= problem.spin_mobility[contact.first] * turn;
-    if (contact.at_wall()) {
-      const std::size_t w = contact.wall();
-      const Vec3& n = problem.wall_normal[w];
-      motion.walls[w] -= problem.wall_inv_mass[w] * r.dot(n) * n;
-    } else {
-      motion.u[contact.other()] -= r / problem.mass[contact.other()];
-      motion.w[contact.other()] -= problem.spin_mobility[contact.other()] * turn;
-    }
-  }
+  for (std::size_t c = 0; c < impulses.size(); ++c)
+    add_impulse(problem, problem.contacts[c], impulses[c], motion);
   return motion;
 }
 
 Vec3 relative_velocity(const StepContact& contact, const Motion& motion) {
   const std::size_t i = contact.first;
   if (contact.at_wall())
-    return motion.u[i] - motion.walls[contact.wall()] - motion.w[i].cross(contact.normal);
+    return motion.u[i] - motion.walls[contact.wall()] - motion.w[i].cross(contact.normal) - contact.drift;
   const std::size_t j = contact.other();
-  return motion.u[i] - motion.u[j] - (motion.w[i] + motion.w[j]).cross(contact.normal);
+  return motion.u[i] - motion.u[j] - (motion.w[i] + motion.w[j]).cross(contact.normal) - contact.drift +
+         stretched(motion.cell, contact.branch);
 }
 
 double speed_of_bodies(const StepProblem& problem, const StepContact& contact) {

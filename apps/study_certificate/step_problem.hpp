@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/study_certificate/step_cell.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/setup.hpp"
 
@@ -21,15 +22,20 @@ struct StepContact {
   Vec3 normal = Vec3::Zero();  ///< unit, from the second to the first
   double bias = 0;             ///< b [m/s]: 0 <= v_n + b, perpendicular to r_n >= 0
   double friction = 0;         ///< mu
+  Vec3 drift = Vec3::Zero();   ///< [m/s] of the second's image beyond it, or of a wall that a cell stretches
+  /// From the second to the first, over the d of the cell; 0 at walls, which do not push it.
+  Vec3 branch = Vec3::Zero();
 
   bool at_wall() const { return second < 0; }
   std::size_t wall() const { return static_cast<std::size_t>(-1 - second); }
   std::size_t other() const { return static_cast<std::size_t>(second); }
 };
 
-/// Velocities of everything: per grain [m/s], w = R omega, and per wall.
+/// Velocities of everything: per grain [m/s], w = R omega, and per wall. `cell`: U = d times what the
+/// contacts give the gradient of a cell's flow; grains and walls have theirs without it.
 struct Motion {
   std::vector<Vec3> u, w, walls;
+  CellVector cell = CellVector::Zero();
 };
 
 /// n grains in the order of the frame, k walls (planes, which move along their normals only where pushed).
@@ -43,7 +49,8 @@ struct StepProblem {
   std::vector<Vec3> wall_normal;      ///< k
   std::vector<double> wall_inv_mass;  ///< k [1/kg]; 0: fixed or driven
   std::vector<double> wall_load;      ///< k [N]
-  double drive_speed = 0;             ///< largest of the driven walls [m/s]
+  StepCell cell;                      ///< one more body where it follows a stress
+  double drive_speed = 0;             ///< largest of the driven walls, or of a cell's flow [m/s]
   double rounding_speed = 0;          ///< what rounding of positions is worth in a step [m/s]
   std::vector<StepContact> contacts;
 
@@ -57,17 +64,22 @@ struct StepInput {
   std::span<const double> loads;  ///< of each wall, along its normal [N]
   const Stage& stage;             ///< time step, gravity, laws
   const Bodies& bodies;           ///< masses, by id, in any order
-  const Setup& setup;             ///< alert distance, overlap correction, rotation
+  const Setup& setup;             ///< alert distance, overlap correction, rotation, cell
+  std::size_t stage_index = 0;    ///< of `stage` in the setup
+  double time = 0;                ///< since the stage began [s]
 };
 
 /// Throws std::invalid_argument for what it has no formulas for: clumps, walls other than planes, cohesion,
 /// rolling resistance.
 StepProblem rebuild_step(const StepInput& input);
 
+/// Adds to `motion` what an impulse r [N s] of the contact does.
+void add_impulse(const StepProblem& problem, const StepContact& contact, const Vec3& r, Motion& motion);
+
 /// Velocity at the end of the step under the impulses, one per contact.
 Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses);
 
-/// Relative velocity of a contact, u_1 - u_2 - (w_1 + w_2) x n [m/s].
+/// Relative velocity of a contact, u_1 - u_2 - (w_1 + w_2) x n - drift + U b [m/s].
 Vec3 relative_velocity(const StepContact& contact, const Motion& motion);
 
 /// Speed of both bodies without contacts [m/s], of which the relative velocity is a difference.

@@ -33,7 +33,22 @@ std::vector<Vec3> wall_impulses(const StepProblem& problem, std::span<const Vec3
   return sum;
 }
 
-/// Momentum that is wrong, and exchanged, by grain and then by wall.
+/// On the faces of the cell, a column for each axis that repeats.
+Mat3 face_impulses(const StepProblem& problem, std::span<const Vec3> r) {
+  Mat3 sum = Mat3::Zero();
+  if (!problem.cell.repeats) return sum;
+  for (std::size_t c = 0; c < r.size(); ++c)
+    if (!problem.contacts[c].at_wall()) sum += r[c] * problem.contacts[c].branch.transpose();
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (!problem.cell.repeats_along[static_cast<std::size_t>(axis)]) sum.col(axis).setZero();
+  return sum;
+}
+
+double mass_of_cell(const StepProblem& problem) {
+  return problem.cell.follows() ? 1 / problem.cell.mobility.maxCoeff() : 0;
+}
+
+/// Momentum that is wrong, and exchanged, by grain, then by wall, then of the cell.
 struct Momenta {
   std::vector<double> wrong, exchanged;
   double all_wrong() const { return std::accumulate(wrong.begin(), wrong.end(), 0.0); }
@@ -59,6 +74,8 @@ Momenta momenta(const StepProblem& problem, const Reference& reference, const St
     found.wrong.push_back(moves ? mass * (wall_velocity(problem, end.after, w) - exact.walls[w]).norm() : 0);
     found.exchanged.push_back(mass * (exact.walls[w] - free.walls[w]).norm());
   }
+  found.wrong.push_back(mass_of_cell(problem) * (end.cell - exact.cell).norm());
+  found.exchanged.push_back(mass_of_cell(problem) * (exact.cell - free.cell).norm());
   return found;
 }
 
@@ -106,6 +123,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
       add(contact.other());
     else if (problem.wall_inv_mass[contact.wall()] > 0)
       add(grains + contact.wall());
+    if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
     if (contact.at_wall()) own.wall_impulse = std::max(own.wall_impulse, exact[c].norm());
   }
   double worst = 0;
@@ -130,6 +148,10 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     wall_unit = std::max({wall_unit, walls[w].norm(), h * std::abs(problem.wall_load[w])});
     wall_wrong = std::max(wall_wrong, (walls[w] - h * end.after.walls[w].force).norm());
   }
+  const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
+  const double load = h * problem.cell.load.cwiseAbs().maxCoeff();
+  wall_unit = std::max({wall_unit, faces.colwise().norm().maxCoeff(), load});
+  wall_wrong = std::max(wall_wrong, wrong.colwise().norm().maxCoeff());
   const Momenta momentum = momenta(problem, reference, end);
   double mass = 0, speed = 0, contact_unit = 0, contact_wrong = 0;
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
@@ -160,13 +182,21 @@ double disagreement(const StepProblem& problem, const StepEnd& end) {
     const double m = problem.mass[k], own = m * (end.after.u[k].norm() + problem.free.u[k].norm());
     most = std::max(most, m * (motion.u[k] - end.after.u[k]).norm() / std::max(impulse, own));
   }
+  // The cell gains of every contact, and prescribed components nothing.
+  double all = 1e-300;
+  for (std::size_t c = 0; c < end.r.size(); ++c) all += end.r[c].norm() * problem.contacts[c].branch.norm();
+  all = std::max(all, problem.time_step * problem.cell.load.norm());
+  const double flow = problem.cell.length * (problem.cell.before.norm() + problem.cell.gain.norm());
+  double mass = mass_of_cell(problem);
+  if (mass == 0) mass = std::accumulate(problem.mass.begin(), problem.mass.end(), 0.0);
+  most = std::max(most, mass * (motion.cell - end.cell).norm() / std::max(all, mass * flow));
   return most;
 }
 
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after) {
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w)
     if (problem.wall_inv_mass[w] > 0) return 0;
-  if (problem.drive_speed > 0) return 0;
+  if (problem.drive_speed > 0 || problem.cell.repeats) return 0;
   double gained = 0, free = 0, fall = 0;
   const auto spin = [](const Frame& frame, std::size_t k) {
     return frame.omega.empty() ? 0.0 : (frame.radius[k] * frame.omega[k]).squaredNorm();

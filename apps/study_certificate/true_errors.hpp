@@ -9,12 +9,15 @@
 namespace talus::audit {
 
 /// True errors of a step, each relative, without what rounding of positions is worth (a step at rest). Let E
-/// be the momentum that the contacts exchange in the exact answer, sum m |u* - u_free| over grains and pushed
-/// walls, but at least a hundredth of the largest wall impulse (grains pressed between fixed walls gain
-/// nothing), and what a driven wall's speed gives to all.
+/// be the momentum that the contacts exchange in the exact answer, sum m |u* - u_free| over grains, pushed
+/// walls and a cell that follows a stress, but at least a hundredth of the largest wall impulse (grains
+/// pressed between fixed walls gain nothing), and what the speed of a driven wall, or of a
+/// driven flow over a diameter, gives to all.
 struct TrueErrors {
-  double velocity = 0;       ///< V: sum m |u - u*| over E
-  double wall_force = 0;     ///< wf: largest error of a wall's impulse over the largest wall impulse or load
+  double velocity = 0;  ///< V: sum m |u - u*| over E
+  /// wf: largest error of a wall's impulse over the largest wall impulse or load. The faces of a cell count
+  /// as walls: sum r (x) b/d of all contacts, a column for each axis.
+  double wall_force = 0;
   double contact_force = 0;  ///< cf: largest error of a contact's impulse over the largest contact impulse
   double cluster = 0;        ///< V of the connected cluster of contacts where it is largest
   double energy = 0;         ///< energy gained that neither loads nor the time step explain, over the kinetic
@@ -23,8 +26,9 @@ struct TrueErrors {
 
 /// What a step ended with, as the run says.
 struct StepEnd {
-  const Frame& after;
-  std::span<const Vec3> r;  ///< impulses_of
+  const Frame& after;                    ///< in the terms of the problem (end_in_cell)
+  std::span<const Vec3> r;               ///< impulses_of
+  CellVector cell = CellVector::Zero();  ///< U of Motion [m/s]
 };
 
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end);
