@@ -22,8 +22,8 @@ std::vector<double> draw_radii_of_cell(SceneBench& bench, double solid, double& 
   const int grains = bench.draw_count(8, 120);
   const double smallest = draw_smallest(bench.draws);
   // Of check_cell, with the distances that detection takes where the scene gives none; the edges differ and
-  // shrink by some per cent.
-  const double least = 1.15 * (4 + 0.6 * smallest) * bench.radius;
+  // lean, and shrink by ten per cent.
+  const double least = 1.35 * (4 + 0.6 * smallest) * bench.radius;
   std::vector<double> radii;
   double volume = 0;
   while (static_cast<int>(radii.size()) < grains || std::cbrt(volume / solid) < least) {

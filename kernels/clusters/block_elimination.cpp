@@ -50,7 +50,7 @@ void divide_from_right(const ConstBlock<size>& factors, Block<size> X) {
 BlockElimination::BlockElimination(const Freedoms& freedoms, const Eigen::VectorXd& diagonal,
                                    std::span<const Pair> pairs)
     : freedoms_(freedoms) {
-  for (std::size_t b = 0; b < freedoms.bodies(); ++b) size_ = freedoms.count(b) > 3 ? 6 : size_;
+  for (std::size_t b = 0; b < freedoms.blocks(); ++b) size_ = freedoms.count(b) > 3 ? 6 : size_;
   order(pairs);
   find_pattern(pairs);
   const auto area = static_cast<std::size_t>(size_ * size_);
@@ -64,7 +64,7 @@ BlockElimination::BlockElimination(const Freedoms& freedoms, const Eigen::Vector
 }
 
 void BlockElimination::order(std::span<const Pair> pairs) {
-  const auto n = static_cast<Eigen::Index>(freedoms_.bodies());
+  const auto n = static_cast<Eigen::Index>(freedoms_.blocks());
   std::vector<Eigen::Triplet<double>> entries;
   for (Eigen::Index b = 0; b < n; ++b) entries.emplace_back(b, b, 1);
   for (const auto& [a, b] : pairs) {
@@ -75,7 +75,7 @@ void BlockElimination::order(std::span<const Pair> pairs) {
   touch.setFromTriplets(entries.begin(), entries.end());
   Eigen::AMDOrdering<int>::PermutationType body_of_pivot;
   Eigen::AMDOrdering<int>()(touch, body_of_pivot);
-  pivot_.resize(freedoms_.bodies());
+  pivot_.resize(freedoms_.blocks());
   for (Eigen::Index k = 0; k < n; ++k) pivot_[at(body_of_pivot.indices()[k])] = static_cast<std::int32_t>(k);
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <iterator>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "kernels/bodies/index.hpp"
@@ -55,7 +56,7 @@ void add_body(Pieces& to, const BodyUnknown& body, Place place) {
 }
 
 /// Numbers of a body and of a contact as they travel: enough for a direct solve.
-constexpr std::size_t body_width = 19, contact_width = 38;
+constexpr std::size_t body_width = 23, contact_width = 40;
 
 void write(std::vector<double>& to, const Vec3& v) {
   to.insert(to.end(), v.begin(), v.end());
@@ -70,9 +71,10 @@ void write(std::vector<double>& to, Place place) {
 void write_body(std::vector<double>& to, std::int32_t cluster, const BodyUnknown& body, Place place) {
   to.push_back(cluster);
   write(to, place);
-  to.insert(to.end(), {body.mass, body.spin_mass, body.radius, body.wall ? 1.0 : 0.0});
+  to.insert(to.end(), {body.mass, body.spin_mass, body.radius, body.wall ? 1.0 : 0.0, body.cell ? 1.0 : 0.0});
   write(to, body.x);
   write(to, body.axis);
+  write(to, body.shears);
   write(to, body.free.u);
   write(to, body.free.w);
 }
@@ -82,7 +84,8 @@ void write_contact(std::vector<double>& to, std::int32_t cluster, const ContactE
                    const std::array<Place, 3>& places, const Vec3& impulse) {
   to.push_back(cluster);
   for (const Place& place : places) write(to, place);
-  to.insert(to.end(), {c.mu, c.drive, static_cast<double>(c.wall), c.levers == nullptr ? 0.0 : 1.0});
+  to.insert(to.end(), {c.mu, c.drive, static_cast<double>(c.wall), static_cast<double>(c.cell), c.reach,
+                       c.levers == nullptr ? 0.0 : 1.0});
   write(to, c.normal);
   write(to, c.offset);
   write(to, impulse);
@@ -124,8 +127,10 @@ void read_body(std::span<const double> row, std::vector<Pieces>& spanning) {
   body.spin_mass = from.number();
   body.radius = from.number();
   body.wall = from.number() != 0;
+  body.cell = from.number() != 0;
   body.x = from.vector();
   body.axis = from.vector();
+  body.shears = from.vector();
   body.free.u = from.vector();
   body.free.w = from.vector();
   add_body(to, body, place);
@@ -141,6 +146,8 @@ void read_contact(std::span<const double> row, std::vector<Pieces>& spanning) {
   joint.equation.mu = from.number();
   joint.equation.drive = from.number();
   joint.equation.wall = from.integer();
+  joint.equation.cell = from.integer();
+  joint.equation.reach = from.number();
   joint.block = from.number() != 0;
   joint.equation.normal = from.vector();
   joint.equation.offset = from.vector();
@@ -208,9 +215,10 @@ std::vector<Pieces> pieces_of_part(const BodyParts& parts, const Clusters& clust
 
 ClusterProblem put_together(Pieces pieces) {
   ClusterProblem made;
-  // Walls stand behind grains (body_problem.hpp).
+  // Walls stand behind grains, and a cell behind these (body_problem.hpp).
   std::sort(pieces.bodies.begin(), pieces.bodies.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.second.wall, a.first) < std::pair(b.second.wall, b.first);
+    return std::tuple(a.second.cell, a.second.wall, a.first) <
+           std::tuple(b.second.cell, b.second.wall, b.first);
   });
   std::sort(pieces.joints.begin(), pieces.joints.end(),
             [](const Joint& a, const Joint& b) { return a.place < b.place; });
@@ -219,13 +227,14 @@ ClusterProblem put_together(Pieces pieces) {
     unknown.emplace(place, static_cast<std::int32_t>(made.bodies.size()));
     made.bodies.push_back(place);
     made.problem.bodies.push_back(body);
-    if (!body.wall) ++made.problem.grains;
+    if (!body.wall && !body.cell) ++made.problem.grains;
   }
   made.levers.reserve(pieces.joints.size());
   for (const Joint& joint : pieces.joints) {
     ContactEquation c = joint.equation;
     c.first = unknown.at(joint.first);
     c.second = joint.second.subdomain < 0 ? -1 : unknown.at(joint.second);
+    if (c.cell >= 0) c.cell = static_cast<std::int32_t>(made.problem.bodies.size()) - 1;
     c.place = -1;
     if (joint.block) c.levers = &made.levers.emplace_back(joint.levers);
     made.problem.contacts.push_back(c);

@@ -156,7 +156,7 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
     if (other.solved || other.error < answer.error) answer = std::move(other);
   };
   double left = thresholds.admissible_share * budget;
-  answer.jammed = none_admissible(problem, goal.enough, thresholds.admissible, left);
+  answer.jammed = !problem.has_cell() && none_admissible(problem, goal.enough, thresholds.admissible, left);
   if (answer.jammed) return;
   if (has_friction(problem)) {
     left += thresholds.coulomb_share * budget;
@@ -166,7 +166,8 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   if (!answer.solved)
     take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;
-  if (!answer.solved) solve_by_matrix(problem, goal.enough, left, thresholds, answer);
+  // A cell that follows a stress couples all contacts: the matrix would be full.
+  if (!answer.solved && !problem.has_cell()) solve_by_matrix(problem, goal.enough, left, thresholds, answer);
 }
 
 }  // namespace

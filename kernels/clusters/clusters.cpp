@@ -42,6 +42,10 @@ std::pair<std::vector<std::int32_t>, std::int32_t> clusters_within(const Contact
   std::vector<char> touched(graph.mass.size(), 0);
   for (const auto& [first, second] : graph.pairs) {
     touched[at(first)] = 1;
+    if (graph.cell >= 0) {
+      touched[at(graph.cell)] = 1;
+      sets.join(first, graph.cell);
+    }
     if (second < 0) continue;
     touched[at(second)] = 1;
     sets.join(first, second);

@@ -12,7 +12,7 @@
 namespace talus {
 
 /// Bodies that are joined by contacts, over any number of parts. Driven and fixed walls join nothing; a wall
-/// of finite mass is a body like others.
+/// of finite mass is a body like others. A cell that follows a stress joins all.
 struct Clusters {
   std::vector<std::vector<std::int32_t>> of_body;   ///< per part and unknown; -1: no contact there
   std::vector<std::int32_t> count;                  ///< per part

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "kernels/clusters/block_elimination.hpp"
@@ -18,13 +19,11 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
-/// A contact and the columns of H that belong to it: what impulses along x, y and z do to its two bodies.
+/// A contact and the columns of H that belong to it: what impulses along x, y and z do to the blocks of
+/// freedoms that it touches.
 struct Columns {
-  struct OfBody {
-    Eigen::Index begin = 0, count = 0;
-    Eigen::Matrix<double, 6, 3> H;
-  };
-  std::array<OfBody, 2> of_body;
+  Freedoms::Column blocks;  ///< which ones: values are those of x
+  std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>> H;
 };
 
 /// Loops that pairs of bodies close which have contacts, in a cluster.
@@ -121,16 +120,13 @@ class CoulombStep {
     Columns columns;
     Mat3 W = Mat3::Zero();
     for (int axis = 0; axis < 3; ++axis) {
-      const auto column = freedoms_.column(c, Vec3(Vec3::Unit(axis)));
-      for (std::size_t b = 0; b < 2; ++b) {
-        columns.of_body[b].begin = column[b].begin;
-        columns.of_body[b].count = column[b].count;
-        columns.of_body[b].H.col(axis) = column[b].value;
-      }
+      const Freedoms::Column column = freedoms_.column(c, Vec3(Vec3::Unit(axis)));
+      if (axis == 0) columns.blocks = column;
+      for (std::size_t b = 0; b < column.size(); ++b) columns.H[b].col(axis) = column[b].value;
     }
-    for (const Columns::OfBody& body : columns.of_body)
-      for (Eigen::Index k = 0; k < body.count; ++k)
-        W += body.H.row(k).transpose() * body.H.row(k) / mass_[body.begin + k];
+    for (std::size_t b = 0; b < columns.H.size(); ++b)
+      for (Eigen::Index k = 0; k < columns.blocks[b].count; ++k)
+        W += columns.H[b].row(k).transpose() * columns.H[b].row(k) / mass_[columns.blocks[b].begin + k];
     const double W_nn = c.normal.dot(W * c.normal);
     normal_.push_back(1 / W_nn);
     tangential_.push_back(c.mu > 0 ? 2 / (W.trace() - W_nn) : 1 / W_nn);
@@ -146,8 +142,11 @@ class CoulombStep {
   BlockElimination eliminated(const std::vector<Mat3>& slope, double& work) const {
     std::vector<BlockElimination::Pair> pairs;
     for (std::size_t k = 0; k < columns_.size(); ++k) {
-      const ContactEquation& c = problem_.contacts[k];
-      if (c.second >= 0 && !slope[k].isZero(0)) pairs.push_back({c.first, c.second});
+      if (slope[k].isZero(0)) continue;
+      const Freedoms::Column& blocks = columns_[k].blocks;
+      Freedoms::each_two(blocks, [&](std::size_t a, std::size_t b) {
+        if (a < b) pairs.push_back({blocks[a].block, blocks[b].block});
+      });
     }
     BlockElimination system(freedoms_, mass_, pairs);
     for (std::size_t k = 0; k < columns_.size(); ++k)
@@ -158,17 +157,16 @@ class CoulombStep {
   }
   /// H S H^T of a contact.
   void add_blocks(std::size_t k, const Mat3& slope, BlockElimination& system) const {
-    const std::array<std::int32_t, 2> bodies{problem_.contacts[k].first, problem_.contacts[k].second};
-    for (std::size_t a = 0; a < 2; ++a)
-      for (std::size_t b = 0; b < 2; ++b)
-        if (bodies[a] >= 0 && bodies[b] >= 0)
-          system.add(bodies[a], bodies[b],
-                     columns_[k].of_body[a].H * slope * columns_[k].of_body[b].H.transpose());
+    const auto& [blocks, H] = columns_[k];
+    Freedoms::each_two(blocks, [&](std::size_t a, std::size_t b) {
+      system.add(blocks[a].block, blocks[b].block, H[a] * slope * H[b].transpose());
+    });
   }
   /// f += H r of a contact.
   void add_force(std::size_t k, const Vec3& r, Vector& f) const {
-    for (const Columns::OfBody& body : columns_[k].of_body)
-      f.segment(body.begin, body.count) += body.H.topRows(body.count) * r;
+    const auto& [blocks, H] = columns_[k];
+    for (std::size_t b = 0; b < H.size(); ++b)
+      f.segment(blocks[b].begin, blocks[b].count) += H[b].topRows(blocks[b].count) * r;
   }
   /// M x + sum of H S H^T x.
   Vector product(const std::vector<Mat3>& slope, const Vector& x) const {
@@ -179,8 +177,9 @@ class CoulombStep {
   /// H^T d of a contact.
   Vec3 change(std::size_t k, const Vector& d) const {
     Vec3 change = Vec3::Zero();
-    for (const Columns::OfBody& body : columns_[k].of_body)
-      change += body.H.topRows(body.count).transpose() * d.segment(body.begin, body.count);
+    const auto& [blocks, H] = columns_[k];
+    for (std::size_t b = 0; b < H.size(); ++b)
+      change += H[b].topRows(blocks[b].count).transpose() * d.segment(blocks[b].begin, blocks[b].count);
     return change;
   }
 

@@ -33,12 +33,10 @@ FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSp
       masses_(freedoms_.masses()),
       columns_(columns_of(problem, freedoms_, springs)),
       system_(freedoms_, masses_, pairs_of(columns_)) {
-  for (const Column& column : columns_)
-    for (std::size_t a = 0; a < 2; ++a)
-      for (std::size_t b = 0; b < 2; ++b)
-        if (column.body[a] >= 0 && column.body[b] >= 0)
-          system_.add(column.body[a], column.body[b],
-                      column.stiffness * column.of_body[a].value * column.of_body[b].value.transpose());
+  for (const auto& [parts, stiffness] : columns_)
+    Freedoms::each_two(parts, [&](std::size_t a, std::size_t b) {
+      system_.add(parts[a].block, parts[b].block, stiffness * parts[a].value * parts[b].value.transpose());
+    });
   system_.factorise();
 }
 
@@ -48,7 +46,7 @@ std::vector<FirmContacts::Column> FirmContacts::columns_of(const BodyProblem& pr
   std::vector<Column> columns;
   for (const ContactSpring& spring : springs) {
     const ContactEquation& c = problem.contacts[spring.contact];
-    columns.push_back({{c.first, c.second}, freedoms.column(c, spring.direction), spring.stiffness});
+    columns.push_back({freedoms.column(c, spring.direction), spring.stiffness});
   }
   return columns;
 }
@@ -56,7 +54,9 @@ std::vector<FirmContacts::Column> FirmContacts::columns_of(const BodyProblem& pr
 std::vector<BlockElimination::Pair> FirmContacts::pairs_of(std::span<const Column> columns) {
   std::vector<BlockElimination::Pair> pairs;
   for (const Column& column : columns)
-    if (column.body[1] >= 0) pairs.push_back(column.body);
+    Freedoms::each_two(column.parts, [&](std::size_t a, std::size_t b) {
+      if (a < b) pairs.push_back({column.parts[a].block, column.parts[b].block});
+    });
   return pairs;
 }
 
@@ -65,9 +65,9 @@ Eigen::VectorXd FirmContacts::product(const Eigen::VectorXd& x) const {
   Eigen::VectorXd y = masses_.cwiseProduct(x);
   for (const Column& column : columns_) {
     double stretch = 0;
-    for (const Freedoms::Part& part : column.of_body)
+    for (const Freedoms::Part& part : column.parts)
       stretch += part.value.head(part.count).dot(x.segment(part.begin, part.count));
-    for (const Freedoms::Part& part : column.of_body)
+    for (const Freedoms::Part& part : column.parts)
       y.segment(part.begin, part.count) += column.stiffness * stretch * part.value.head(part.count);
   }
   return y;

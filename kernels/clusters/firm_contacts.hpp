@@ -20,8 +20,8 @@ struct ContactSpring {
   double stiffness = 0;           ///< impulse per velocity [kg], > 0
 };
 
-/// A = M + sum of H e k e^T H^T, springs of direction e and stiffness k, over the freedoms of the bodies (3
-/// of a grain, 6 where it turns, 1 of a wall), factorised directly.
+/// A = M + sum of H e k e^T H^T, springs of direction e and stiffness k, over the freedoms of the bodies,
+/// factorised directly.
 class FirmContacts {
  public:
   /// Each contact with the stiffness rho of `firmness` effective masses: along its normal, with mu > 0 in all
@@ -48,8 +48,7 @@ class FirmContacts {
  private:
   /// What a spring does to the bodies of its contact.
   struct Column {
-    std::array<std::int32_t, 2> body;  ///< the second -1 at a driven wall
-    std::array<Freedoms::Part, 2> of_body;
+    Freedoms::Column parts;
     double stiffness;
   };
   static std::vector<Column> columns_of(const BodyProblem& problem, const Freedoms& freedoms,

@@ -37,6 +37,14 @@ enum Measure {
 using Measures = std::array<double, measures>;
 constexpr RowColumns columns_of_measures{.sums = sums, .largest = measures - sums};
 
+/// |b| over the edge of the cell, b between the bodies of a contact: the part of its impulse that a face
+/// feels which is normal to b. `edge`: of a cell whose flow is given [m]; 0 without one.
+double face_share(const BodyProblem& problem, const ContactEquation& c, double edge) {
+  if (c.cell >= 0) return c.reach / problem.bodies[at(c.cell)].radius;
+  if (edge == 0 || c.wall >= 0 || c.second < 0) return 0;
+  return (problem.bodies[at(c.first)].radius + problem.bodies[at(c.second)].radius) / edge;
+}
+
 Measures measures_of(const BodyProblem& problem) {
   Measures row{};
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
@@ -55,6 +63,7 @@ Measures measures_of(const BodyProblem& problem) {
     row[fastest] = larger(row[fastest], c.offset.norm());
     row[largest] = larger(row[largest], r.norm());
     if (c.wall >= 0) row[pressed] += std::abs(c.normal.dot(r));
+    if (c.cell >= 0) row[pressed] += face_share(problem, c, 0) * std::abs(c.normal.dot(r));
     if (r != Vec3::Zero()) row[drive] = larger(row[drive], c.drive);
   }
   return row;
@@ -69,6 +78,13 @@ double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
                    thresholds.rounding * most_momentum(row[mass], row[incoming])});
 }
 
+/// The same cluster with nothing driven: forces may be small where walls or a flow are fast, and are asked
+/// for all the same.
+Measures standing(Measures row) {
+  row[drive] = 0;
+  return row;
+}
+
 /// Where the answers of clusters come together: those that several processes hold count in one of them.
 class Answers {
  public:
@@ -80,6 +96,7 @@ class Answers {
     }
     answers_.resize(clusters_.size());
     scales_.resize(clusters_.size());
+    exchanges_.resize(clusters_.size());
   }
 
   void solve(const ErrorGoal& goal) {
@@ -95,15 +112,17 @@ class Answers {
           rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
       scales_[c] =
           std::max({scale_of(rows[c], thresholds_), thresholds_.interest * everywhere * share, still});
+      exchanges_[c] = larger(scale_of(standing(rows[c]), thresholds_), still);
       answers_[c] = solve_cluster(clusters_[c].problem, {goal.enough * scales_[c], goal.enough, goal.sweeps},
                                   thresholds_.cluster);
     });
   }
 
-  StepError error(double enough, double walls) const {
+  StepError error(const ErrorGoal& goal) const {
+    const double enough = goal.enough;
     StepError error;
     error.velocity = largest([&](std::size_t c) { return velocity_error(c); });
-    error.wall = wall_error(walls);
+    error.wall = wall_error(goal);
     const double most = largest([&](std::size_t c) { return largest_impulse(c); });
     const auto contact = [&](std::size_t c) { return contact_error(c, most); };
     error.contact = largest(contact);
@@ -165,28 +184,35 @@ class Answers {
     for (const Vec3& by : answers_[c].found) change = larger(change, by.norm());
     if (change == 0) return 0;
     const double interest = thresholds_.interest;
-    return change / std::max({largest_impulse(c), interest * most, interest * scales_[c]});
+    return change / std::max({largest_impulse(c), interest * most, interest * exchanges_[c]});
   }
-  /// Changes of the impulses of walls over the largest impulse of a wall, at least `least`: the largest.
-  double wall_error(double least) const {
+  /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least
+  /// ErrorGoal::walls: the largest.
+  double wall_error(const ErrorGoal& goal) const {
     const double walls = largest([&](std::size_t c) {
       double count = 0;
       for (const ContactEquation& k : clusters_[c].problem.contacts) count = std::max(count, k.wall + 1.0);
       return count;
     });
-    const auto n = static_cast<std::size_t>(walls);
-    if (n == 0) return 0;
+    const auto first_face = static_cast<std::size_t>(walls), n = first_face + 3;
     const std::vector<double> sum = parts_.total(6 * n, [&](std::size_t p, std::span<double> row) {
+      const auto add = [&](std::size_t wall, const Vec3& impulse, const Vec3& change) {
+        Eigen::Map<Vec3>(&row[6 * wall]) += impulse + change;
+        Eigen::Map<Vec3>(&row[6 * wall + 3]) += change;
+      };
       for (const std::size_t c : own_[p])
         for (std::size_t k = 0; k < answers_[c].found.size(); ++k) {
-          const std::int32_t wall = clusters_[c].problem.contacts[k].wall;
-          if (wall < 0) continue;
-          const Vec3& change = answers_[c].found[k];
-          Eigen::Map<Vec3>(&row[6 * at(wall)]) += clusters_[c].problem.impulse[k] + change;
-          Eigen::Map<Vec3>(&row[6 * at(wall) + 3]) += change;
+          const BodyProblem& problem = clusters_[c].problem;
+          const ContactEquation& contact = problem.contacts[k];
+          const Vec3 &impulse = problem.impulse[k], &change = answers_[c].found[k];
+          if (contact.wall >= 0) add(at(contact.wall), impulse, change);
+          const Vec3 share = face_share(problem, contact, goal.edge) * contact.normal;
+          if (share.isZero(0)) continue;
+          for (std::size_t axis = 0; axis < 3; ++axis)
+            add(first_face + axis, share[axis] * impulse, share[axis] * change);
         }
     });
-    double scale = least, error = 0;
+    double scale = goal.walls, error = 0;
     for (std::size_t w = 0; w < n; ++w) {
       scale = larger(scale, Eigen::Map<const Vec3>(&sum[6 * w]).norm());
       error = larger(error, Eigen::Map<const Vec3>(&sum[6 * w + 3]).norm());
@@ -211,8 +237,9 @@ class Answers {
   const StepErrorThresholds& thresholds_;
   std::vector<std::vector<std::size_t>> own_;  ///< per part: clusters that it answers for
   std::vector<ClusterAnswer> answers_;
-  std::vector<double> scales_;  ///< [N s]
-  Exchanged exchanged_;         ///< by all of them
+  std::vector<double> scales_;     ///< [N s]
+  std::vector<double> exchanges_;  ///< likewise, as if nothing were driven [N s]
+  Exchanged exchanged_;            ///< by all of them
 };
 
 }  // namespace
@@ -224,7 +251,7 @@ StepError step_error(std::span<const BodyProblem> problems, const PartLink& link
   for (const BodyProblem& problem : problems) graphs.push_back(graph_of(problem));
   Answers answers(parts, cluster_problems(parts, clusters_of(graphs, link)), thresholds);
   answers.solve(goal);
-  return answers.error(goal.enough, goal.walls);
+  return answers.error(goal);
 }
 
 StepError step_error(const BodyProblem& problem, const ErrorGoal& goal,

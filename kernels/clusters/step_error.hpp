@@ -29,8 +29,9 @@ struct StepErrorThresholds {
 /// Distance of what the impulses of a step give from a solution of it, relative.
 struct StepError {
   double velocity = 0;  ///< of the worst cluster: sum m |V(r) - V*| over its scale
-  double wall = 0;      ///< of the worst wall: its impulse, over the largest impulse of a wall
-  double contact = 0;   ///< of the worst contact: its impulse, over the largest of its cluster
+  double wall = 0;     ///< of the worst wall: its impulse, over the largest impulse of a wall; the faces of a
+                       ///< cell are walls
+  double contact = 0;  ///< of the worst contact: its impulse, over the largest of its cluster
   PartImpulses change;  ///< of r, per part and contact, that mends it as far as answers help [N s]
   bool mends = false;   ///< of clusters that are wrong by more than what is asked for it mends some
   bool solved = true;   ///< of all of those an answer was found
@@ -49,6 +50,7 @@ struct ErrorGoal {
       0;  ///< [m/s]: velocities that rounding of positions makes in gaps; slower bodies are at rest
   double walls =
       0;  ///< [N s]: largest impulse of a wall, from all its contacts; more than from small clusters
+  double edge = 0;  ///< [m], of a cell whose flow is given and whose faces are walls; 0: there is none
 };
 
 /// The distance to an answer of every cluster (cluster_solver.hpp), all of which must be small. Without

@@ -24,6 +24,7 @@ ContactGraph graph_of(const StepReader& step) {
   note_copies(step, graph);
   graph.mass.reserve(step.unknowns());
   for (std::size_t b = 0; b < step.unknowns(); ++b) graph.mass.push_back(step.mass(b));
+  graph.cell = step.cell();
   graph.pairs.reserve(step.contacts());
   step.each_place([&](std::size_t c, std::size_t k) { graph.pairs.push_back(step.pair_at(c, k)); });
   return graph;
@@ -35,6 +36,7 @@ ContactGraph graph_of(const BodyProblem& problem) {
   ContactGraph graph;
   for (const BodyUnknown& body : problem.bodies) graph.mass.push_back(body.mass);
   for (const ContactEquation& c : problem.contacts) graph.pairs.push_back({c.first, c.second});
+  if (problem.has_cell()) graph.cell = static_cast<std::int32_t>(problem.bodies.size()) - 1;
   graph.subdomain = problem.subdomain;
   graph.counts = problem.counts;
   graph.shared = problem.shared;

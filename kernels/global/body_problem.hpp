@@ -87,6 +87,7 @@ struct BodyProblem {
 struct ContactGraph {
   std::vector<double> mass;                        ///< per unknown [kg]
   std::vector<std::array<std::int32_t, 2>> pairs;  ///< per contact its unknowns; second -1 at a driven wall
+  std::int32_t cell = -1;  ///< unknown that all contacts push; -1: no cell follows a stress
   std::int32_t subdomain = 0;
   std::vector<char> counts;
   std::vector<std::int32_t> shared;

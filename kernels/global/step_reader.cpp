@@ -128,7 +128,7 @@ ContactEquation StepReader::equation_at(std::size_t chunk, std::size_t place) co
     contact.offset -= drift;
   }
   if (has_cell()) {
-    contact.cell = static_cast<std::int32_t>(unknowns()) - 1;
+    contact.cell = cell();
     contact.reach = w < 0 ? contacts.reach[place] : 0;
   }
   contact.place = static_cast<std::int32_t>(place);

@@ -26,6 +26,8 @@ class StepReader final : public ProblemReader {
   void each_contact(const Visit& visit) const override;
 
   std::size_t grains() const { return end_ - begin_; }  ///< unknowns before the first wall
+  /// Unknown of a cell that follows a stress; -1: there is none.
+  std::int32_t cell() const { return has_cell() ? static_cast<std::int32_t>(unknowns()) - 1 : -1; }
   std::int32_t subdomain() const { return part_ ? part_->subdomain : 0; }
   bool in_parts() const { return part_.has_value(); }
   bool shared(std::size_t body) const;  ///< has copies in other parts

@@ -210,13 +210,23 @@ double GlobalSolver::sweeps_needed(double spread) const {
   return estimate_stiffness(gather_graphs(), *link_);
 }
 
+double GlobalSolver::grains_everywhere() const {
+  const Decomposition& all = state_.decomposition;
+  if (!all.several()) return static_cast<double>(state_.bodies.size());
+  return total_of(*link_, all.here.size(), 1, [&](std::size_t p, std::span<double> row) {
+    const auto [begin, end] = all.slots_of(SubdomainPlace(static_cast<std::int32_t>(p)));
+    for (std::size_t s = begin; s < end; ++s) row[0] += all.counts[s] != 0 ? 1 : 0;
+  })[0];
+}
+
 void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   small_ = false;
   large_ = true;
   groups_ = {};
-  // A cell that follows a stress ties all contacts together.
-  if (state_.cell.loaded()) return;
   const Whole span(*this);
+  // A cell that follows a stress ties all contacts together.
+  if (state_.cell.loaded() && grains_everywhere() >= (parameters_.friction ? small.bodies : small.smooth))
+    return;
   const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);
   in_small_ = in_small_clusters(clusters, small, parameters_.friction);
@@ -282,8 +292,9 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
   double walls = 0;
   for (const WallState& wall : state_.wall_states) walls = std::max(walls, wall.impulse.norm());
-  StepError error =
-      step_error(problems_, *link_, {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls});
+  const double edge = state_.domain.flows && !state_.cell.loaded() ? state_.domain.edges().maxCoeff() : 0;
+  StepError error = step_error(
+      problems_, *link_, {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls, .edge = edge});
   change_ = std::move(error.change);
   mends_ = error.mends;
   // For `correct` the contacts and their impulses are enough.
