@@ -80,7 +80,24 @@ struct Solved {
   SolveRow row;
   std::vector<double> r;
   std::int64_t failed_contacts = 0;
+  double approach = 0;  ///< of the contacts that the answer lets close fastest, over the largest |q|
 };
+
+/// Both errors compare with the impulses, which grow without bound where no velocity keeps all contacts open:
+/// what is left of the approach then tells that there is no solution.
+double approach_left(const DelassusProblem& problem, std::span<const double> r) {
+  std::vector<double> u(r.size());
+  relative_velocity(problem, r, u);
+  double approach = 0, given = 0;
+  for (std::size_t k = 0; k < problem.contacts(); ++k) {
+    approach = std::max(approach, -u[3 * k]);
+    given = std::max(given, problem.q[k].norm());
+  }
+  return given > 0 ? approach / given : 0;
+}
+
+/// The largest approach_left that is not told.
+constexpr double most_approach = 0.1;
 
 /// `alive` is called now and then while it solves.
 Solved solve_one(const DelassusProblem& problem, const std::string& name, DelassusMethod method,
@@ -105,6 +122,7 @@ Solved solve_one(const DelassusProblem& problem, const std::string& name, Delass
   std::nth_element(times.begin(), middle, times.end());
   solved.row = solve_row(name, problem.contacts(), method, report, *middle);
   solved.failed_contacts = report.failed_contacts;
+  if (report.converged) solved.approach = approach_left(problem, solved.r);
   return solved;
 }
 
@@ -148,6 +166,13 @@ int solve(const SolveOptions& options, const Plan& plan) {
         print_error(
             "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
             file.path.string(), solved.failed_contacts);
+      if (solved.approach > most_approach)
+        print_error(
+            "talus: warning: {}: contacts still close at {:.2g} of the largest velocity in q, beside "
+            "impulses "
+            "so large that the error, which is relative to them, is within its tolerance: there may be no "
+            "solution\n",
+            file.path.string(), solved.approach);
       rows.push_back(std::move(solved.row));
     }
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <array>
 #include <filesystem>
 #include <optional>
@@ -40,7 +41,12 @@ io::Camera camera_of(const ViewCommandOptions& options) {
   static constexpr std::array<io::Camera, 3> along{{{0, 0}, {-90, 0}, {-90, 90}}};
   io::Camera camera;
   if (!options.slice.empty()) camera = along[static_cast<std::size_t>(axis_of(options.slice))];
-  return {options.azimuth.value_or(camera.azimuth), options.elevation.value_or(camera.elevation)};
+  camera = {options.azimuth.value_or(camera.azimuth), options.elevation.value_or(camera.elevation)};
+  if (!std::isfinite(camera.azimuth) || !std::isfinite(camera.elevation))
+    throw std::invalid_argument(
+        fmt::format("--azimuth {:g} and --elevation {:g}: give finite angles, in degrees", camera.azimuth,
+                    camera.elevation));
+  return camera;
 }
 
 /// The frames of a run and how they are to be seen. Throws std::exception where options mean nothing.

@@ -61,7 +61,7 @@ int report_command(const ReportOptions& options) {
                                         : std::filesystem::path(options.out);
   try {
     const RunFolder run = read_run_folder(options.directory);
-    io::check_output_files(sources_in(options.directory), {out}, true);
+    io::check_output_files(sources_in(options.directory), {out}, options.out.empty() || options.force);
     page = page_of(run);
   } catch (const nlohmann::json::exception& error) {
     print_error("talus: error: {}\n", damaged_value(options.directory, error));

@@ -11,10 +11,11 @@ std::string run_report(const std::filesystem::path& directory);
 
 struct ReportOptions {
   std::string directory;
-  std::string out;  ///< file; "": report.html in the directory
+  std::string out;     ///< file; "": report.html in the directory, which replaces an earlier one
+  bool force = false;  ///< replace a file `out` that is there
 };
 
-/// Writes it; an earlier report is replaced. Returns an ExitCode.
+/// Writes it. Returns an ExitCode.
 int report_command(const ReportOptions& options);
 
 }  // namespace talus

@@ -111,6 +111,10 @@ WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_
                    poses.radius[i] * contact_normal(contacts, k));
     sums.torque += poses.domain.separation(point, measure.about).cross(r);
     sums.drift += r.dot(drift_of(contacts, k));
+    if (contacts.arm.empty()) continue;
+    const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
+    sums.torque += moment;
+    if (!contacts.spin.empty()) sums.drift += moment.dot(contacts.spin[k]);
   }
   return sums;
 }

@@ -140,7 +140,8 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     const std::size_t i = at(body);
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity_at(in.x[i]));
-    through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
+    const double came = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.came_at(in.x[i]));
+    through += std::min(0.0, gap - in.time_step * came) - gap > 0.5 * in.radius[i];
     const PairLaw& law = law_of(phase, pair);
     const GapResult<double> found =
         solve_gap(rule, gap, v_n, v_n + fall, law.restitution, law.reach() * in.radius[i]);
@@ -176,7 +177,8 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const Vec3 u = Eigen::Map<const Vec3>(in.velocity[i].u), v = u - of.velocity_at(in.x[i]),
                free = v + in.time_step * in.gravity;
     // Asked first: from deep in a solid no feature is to be seen any more.
-    through += detail::passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
+    through +=
+        detail::passed_surface(of, in.x[i], in.time_step * (u - of.came_at(in.x[i])), in.radius[i]) ? 1 : 0;
     points.clear();
     collide(of, in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);

@@ -52,6 +52,8 @@ struct Wall {
   Vec3 omega = Vec3::Zero();            ///< [rad/s] now, beside `velocity`, which then is that of the
   Vec3 pivot = Vec3::Zero();            ///< point [m] here
   RigidVelocity belt = {};              ///< of the material in its surface, against the surface
+  RigidVelocity came = {};  ///< with which a prescribed motion brought it here from the middle of the step
+                            ///< before
   Vec3 torque_point = Vec3::Constant(std::nan(""));  ///< in its first place: about which its torque is told
                                                      ///< [m]; not finite: found before the first step
   std::string from_stage = {}, until_stage = {};  ///< there from, and until, the beginning of these; empty:
@@ -65,6 +67,8 @@ struct Wall {
   Vec3 velocity_at(const Vec3& c) const {
     return motion.empty() ? velocity : Vec3(velocity + omega.cross(c - pivot));
   }
+  /// How it moved from the middle of the step before to that of this one at a point c [m/s].
+  Vec3 came_at(const Vec3& c) const { return motion.empty() ? velocity : came.at(c); }
   /// What its material has beyond `velocity` at a point c of contact with this normal [m/s]: of the belt what
   /// lies in the surface.
   Vec3 drift_at(const Vec3& c, const Vec3& n) const {

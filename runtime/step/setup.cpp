@@ -151,6 +151,11 @@ void validate_grains(const Setup& setup) {
   for (const RemoveRule& rule : setup.removes) {
     const std::string region = fault_of(rule.region);
     require(region.empty(), fmt::format("remove '{}': {}", rule.name, region));
+    for (const double at : rule.at)
+      require(at >= rule.times.from && at < rule.times.until,
+              fmt::format("remove '{}': at = {} s is not within from = {} s and until = {} s. Change one of "
+                          "them, or leave from and until away",
+                          rule.name, at, rule.times.from, rule.times.until));
   }
 }
 

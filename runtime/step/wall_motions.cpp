@@ -143,6 +143,7 @@ void prepare_walls(double time, double h, StepState& state, const graph::Communi
     Wall& wall = state.walls[w];
     if (wall.motion.empty()) continue;
     set_velocities(time, h, wall);
+    wall.came = mean_velocity(wall.motion, time - 0.5 * h, h);
     state.wall_states[w].middle = pose_at(wall.motion, time + 0.5 * h);
     state.wall_states[w].end = pose_at(wall.motion, time + h);
     planes_turn |= wall.surface() == nullptr && turns(wall);

@@ -51,6 +51,20 @@ TEST_F(ThinnedOutput, HasContactsInEverySecondFrame) {
   EXPECT_GT(with, 1U);
 }
 
+TEST_F(ThinnedOutput, OfARunIsDrawnAndToldWithoutReplacingWhatSomebodyElseWrote) {
+  write(at("scene.toml"), pressed_box);
+  ASSERT_EQ(run("run scene.toml --out out").code, 0);
+  write(at("notes.html"), "mine");
+  EXPECT_EQ(run("report out --out notes.html").code, 2);
+  EXPECT_EQ(content(at("notes.html")), "mine");
+  EXPECT_EQ(run("report out --out notes.html --force").code, 0);
+  EXPECT_NE(content(at("notes.html")), "mine");
+  EXPECT_EQ(run("report out").code, 0) << "its own page is made anew";
+  for (const char* angle : {"--azimuth nan", "--azimuth inf", "--elevation nan"})
+    EXPECT_EQ(run(std::string("view out -o view.png ") + angle).code, 2) << angle;
+  EXPECT_FALSE(fs::exists(at("view.png")));
+}
+
 class ColumnDictionary : public CommandTest {
  protected:
   /// Runs the scene; `tables` are the tables that it is to write.

@@ -8,6 +8,7 @@ namespace {
 void add_options(CLI::App& app, ReportOptions& options) {
   app.add_option("directory", options.directory, "directory of the results")->type_name("DIR")->required();
   app.add_option("-o,--out", options.out, "file [report.html in the directory]")->type_name("FILE");
+  app.add_flag("--force", options.force, "replace a file of --out that is there");
 }
 
 int run(ReportOptions& options, CommandLine) {

@@ -64,12 +64,13 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   if (wall.surface() != nullptr) {
     // Behind a thin surface, and in a solid, the point where the ball is near it now tells nothing.
     const Mat3 lever = lever_of(in, pair.body, touch.ball.centre - in.x[at(pair.body)]);
-    const Vec3 v = velocity_at(in, pair.body, lever) - wall.velocity_at(touch.ball.centre);
+    const Vec3 v = velocity_at(in, pair.body, lever) - wall.came_at(touch.ball.centre);
     meeting.passed = passed_surface(wall, touch.ball.centre, in.time_step * v, touch.ball.radius);
     return meeting;
   }
   // The wall counts as the surface of a body as large as the ball.
-  const double way = in.time_step * touch.normal.dot(meeting.v);
+  const Vec3 v = velocity_at(in, pair.body, meeting.levers.first) - wall.came_at(touch.point);
+  const double way = in.time_step * touch.normal.dot(v);
   meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.smaller_radius;
   return meeting;
 }

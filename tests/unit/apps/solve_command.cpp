@@ -50,8 +50,9 @@ void write_dataset(hid_t file, const char* name, hid_t type, hsize_t size, const
 }
 
 /// A chain of contacts, W = tridiagonal (-1, 2, -1) in each component, hard enough to need many sweeps.
-/// `solvable`: without, contact 0 approaches while its whole row of W is zero.
-fs::path write_chain(const fs::path& path, int contacts, bool solvable = true) {
+/// `solvable`: without, contact 0 approaches while its whole row of W is zero. With a `diagonal` of 1 both of
+/// two contacts cannot open: what one impulse parts it closes elsewhere.
+fs::path write_chain(const fs::path& path, int contacts, bool solvable = true, double diagonal = 2) {
   std::vector<int> i, p;
   std::vector<double> x, q, mu(static_cast<std::size_t>(contacts), 0.5);
   for (int c = 0; c < contacts; ++c) {
@@ -60,7 +61,7 @@ fs::path write_chain(const fs::path& path, int contacts, bool solvable = true) {
            ++other) {
         i.push_back(3 * c + k);
         p.push_back(3 * other + k);
-        x.push_back(other == c ? 2 : -1);
+        x.push_back(other == c ? diagonal : -1);
       }
     }
     q.insert(q.end(), {-1, 0.1, 0});
@@ -119,6 +120,15 @@ TEST_F(SolveCommand, ReturnsThreeWhenTheToleranceIsMissedAndSaysWhy) {
   EXPECT_FALSE(nlohmann::json::parse(outcome.output).at("converged").get<bool>());
   EXPECT_NE(talus("solve " + problem.string() + " --max-seconds 0.2", true).output.find("no solution"),
             std::string::npos);
+}
+
+// Impulses grow until the error, which is relative to them, is small.
+TEST_F(SolveCommand, SaysWhereContactsStillCloseThoughTheErrorIsSmall) {
+  const std::string warns = "there may be no solution";
+  const Outcome without = talus("solve " + write_chain(folder_ / "closed.hdf5", 2, true, 1).string(), true);
+  EXPECT_NE(without.output.find(warns), std::string::npos) << without.output;
+  const Outcome with = talus("solve " + write_chain(folder_ / "open.hdf5", 2).string(), true);
+  EXPECT_EQ(with.output.find(warns), std::string::npos) << with.output;
 }
 
 TEST_F(SolveCommand, WritesASolutionThatStandsUpToTheErrorItReports) {
