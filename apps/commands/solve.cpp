@@ -96,7 +96,7 @@ double approach_left(const DelassusProblem& problem, std::span<const double> r) 
   return given > 0 ? approach / given : 0;
 }
 
-/// The largest approach_left that is not told.
+/// The largest approach_left that is not told, unless a tolerance is as loose.
 constexpr double most_approach = 0.1;
 
 /// `alive` is called now and then while it solves.
@@ -166,7 +166,7 @@ int solve(const SolveOptions& options, const Plan& plan) {
         print_error(
             "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
             file.path.string(), solved.failed_contacts);
-      if (solved.approach > most_approach)
+      if (solved.approach > std::max(most_approach, 10 * options.tol))
         print_error(
             "talus: warning: {}: contacts still close at {:.2g} of the largest velocity in q, beside "
             "impulses "

@@ -131,7 +131,7 @@ void make_cell(SceneBench& bench) {
   stage.time_step = natural * light * draws.between_decades(0.02, solid < 0.58 ? 0.1 : 0.5);
   if (load != CellLoad::prescribed)
     draw_stress(draws, p, load == CellLoad::deviatoric || draws.chance(0.3), stage.stress);
-  // A step strains the cell by a tenth at most.
+  // A step strains the cell by a twentieth at most.
   const double fastest = std::min(0.3 / natural, 0.05 / stage.time_step);
   if (load == CellLoad::driven || load == CellLoad::prescribed)
     draw_rate(draws, fastest * draws.between_decades(1e-3, 1), stage);

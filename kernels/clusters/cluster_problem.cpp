@@ -56,7 +56,7 @@ void add_body(Pieces& to, const BodyUnknown& body, Place place) {
 }
 
 /// Numbers of a body and of a contact as they travel: enough for a direct solve.
-constexpr std::size_t body_width = 23, contact_width = 40;
+constexpr std::size_t body_width = 23, contact_width = 42;
 
 void write(std::vector<double>& to, const Vec3& v) {
   to.insert(to.end(), v.begin(), v.end());
@@ -84,9 +84,10 @@ void write_contact(std::vector<double>& to, std::int32_t cluster, const ContactE
                    const std::array<Place, 3>& places, const Vec3& impulse) {
   to.push_back(cluster);
   for (const Place& place : places) write(to, place);
-  to.insert(to.end(), {c.mu, c.drive, static_cast<double>(c.wall), static_cast<double>(c.cell), c.reach,
+  to.insert(to.end(), {c.mu, c.drive, static_cast<double>(c.wall), static_cast<double>(c.cell),
                        c.levers == nullptr ? 0.0 : 1.0});
   write(to, c.normal);
+  write(to, c.branch);
   write(to, c.offset);
   write(to, impulse);
   if (c.levers == nullptr) return;
@@ -147,9 +148,9 @@ void read_contact(std::span<const double> row, std::vector<Pieces>& spanning) {
   joint.equation.drive = from.number();
   joint.equation.wall = from.integer();
   joint.equation.cell = from.integer();
-  joint.equation.reach = from.number();
   joint.block = from.number() != 0;
   joint.equation.normal = from.vector();
+  joint.equation.branch = from.vector();
   joint.equation.offset = from.vector();
   joint.impulse = from.vector();
   if (joint.block) joint.levers = {from.matrix(), from.matrix()};

@@ -33,7 +33,8 @@ std::ptrdiff_t loops_of(const BodyProblem& problem) {
     if (c.second >= 0) pairs.push_back({std::min(c.first, c.second), std::max(c.first, c.second)});
   std::sort(pairs.begin(), pairs.end());
   const auto pairs_end = std::unique(pairs.begin(), pairs.end());
-  return pairs_end - pairs.begin() - static_cast<std::ptrdiff_t>(problem.bodies.size()) + 1;
+  const std::size_t bodies = problem.bodies.size() - (problem.has_cell() ? 1 : 0);
+  return pairs_end - pairs.begin() - static_cast<std::ptrdiff_t>(bodies) + 1;
 }
 
 /// The problem of a step, around impulses t.

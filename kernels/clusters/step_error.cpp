@@ -37,15 +37,16 @@ enum Measure {
 using Measures = std::array<double, measures>;
 constexpr RowColumns columns_of_measures{.sums = sums, .largest = measures - sums};
 
-/// |b| over the edge of the cell, b between the bodies of a contact: the part of its impulse that a face
-/// feels which is normal to b. `edge`: of a cell whose flow is given [m]; 0 without one.
-double face_share(const BodyProblem& problem, const ContactEquation& c, double edge) {
-  if (c.cell >= 0) return c.reach / problem.bodies[at(c.cell)].radius;
-  if (edge == 0 || c.wall >= 0 || c.second < 0) return 0;
-  return (problem.bodies[at(c.first)].radius + problem.bodies[at(c.second)].radius) / edge;
+/// The parts of a contact's impulse that the faces across x, y and z of a cell feel: b over the edges, b from
+/// one body to the other; of blocks whose flow is given, as between the spheres that hold them.
+Vec3 face_shares(const BodyProblem& problem, const ContactEquation& c, const Vec3& faces) {
+  if (c.wall >= 0 || c.second < 0) return Vec3::Zero();
+  if (c.cell >= 0) return faces.cwiseProduct(c.branch);
+  const double between = problem.bodies[at(c.first)].radius + problem.bodies[at(c.second)].radius;
+  return faces.cwiseProduct(between * c.normal);
 }
 
-Measures measures_of(const BodyProblem& problem) {
+Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
   Measures row{};
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
   for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
@@ -63,7 +64,7 @@ Measures measures_of(const BodyProblem& problem) {
     row[fastest] = larger(row[fastest], c.offset.norm());
     row[largest] = larger(row[largest], r.norm());
     if (c.wall >= 0) row[pressed] += std::abs(c.normal.dot(r));
-    if (c.cell >= 0) row[pressed] += face_share(problem, c, 0) * std::abs(c.normal.dot(r));
+    row[pressed] += face_shares(problem, c, faces).norm() * std::abs(c.normal.dot(r));
     if (r != Vec3::Zero()) row[drive] = larger(row[drive], c.drive);
   }
   return row;
@@ -101,7 +102,7 @@ class Answers {
 
   void solve(const ErrorGoal& goal) {
     std::vector<Measures> rows(clusters_.size());
-    each([&](std::size_t c) { rows[c] = measures_of(clusters_[c].problem); });
+    each([&](std::size_t c) { rows[c] = measures_of(clusters_[c].problem, goal.faces); });
     const Measures all = total(rows);
     exchanged_ = {all[energy], all[grains]};
     const double everywhere = scale_of(all, thresholds_);
@@ -194,7 +195,9 @@ class Answers {
       for (const ContactEquation& k : clusters_[c].problem.contacts) count = std::max(count, k.wall + 1.0);
       return count;
     });
-    const auto first_face = static_cast<std::size_t>(walls), n = first_face + 3;
+    const auto first_face = static_cast<std::size_t>(walls);
+    const std::size_t n = first_face + (goal.faces.isZero(0) ? 0 : 3);
+    if (n == 0) return 0;
     const std::vector<double> sum = parts_.total(6 * n, [&](std::size_t p, std::span<double> row) {
       const auto add = [&](std::size_t wall, const Vec3& impulse, const Vec3& change) {
         Eigen::Map<Vec3>(&row[6 * wall]) += impulse + change;
@@ -206,10 +209,11 @@ class Answers {
           const ContactEquation& contact = problem.contacts[k];
           const Vec3 &impulse = problem.impulse[k], &change = answers_[c].found[k];
           if (contact.wall >= 0) add(at(contact.wall), impulse, change);
-          const Vec3 share = face_share(problem, contact, goal.edge) * contact.normal;
-          if (share.isZero(0)) continue;
-          for (std::size_t axis = 0; axis < 3; ++axis)
-            add(first_face + axis, share[axis] * impulse, share[axis] * change);
+          const Vec3 share = face_shares(problem, contact, goal.faces);
+          for (std::size_t face = first_face; face < n; ++face) {
+            const double part = share[static_cast<Eigen::Index>(face - first_face)];
+            add(face, part * impulse, part * change);
+          }
         }
     });
     double scale = goal.walls, error = 0;
@@ -238,7 +242,8 @@ class Answers {
   std::vector<std::vector<std::size_t>> own_;  ///< per part: clusters that it answers for
   std::vector<ClusterAnswer> answers_;
   std::vector<double> scales_;     ///< [N s]
-  std::vector<double> exchanges_;  ///< likewise, as if nothing were driven [N s]
+  std::vector<double> exchanges_;  ///< what forces are no less than a part of: as if nothing were driven, and
+                                   ///< each cluster stood alone [N s]
   Exchanged exchanged_;            ///< by all of them
 };
 

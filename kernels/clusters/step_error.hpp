@@ -50,7 +50,9 @@ struct ErrorGoal {
       0;  ///< [m/s]: velocities that rounding of positions makes in gaps; slower bodies are at rest
   double walls =
       0;  ///< [N s]: largest impulse of a wall, from all its contacts; more than from small clusters
-  double edge = 0;  ///< [m], of a cell whose flow is given and whose faces are walls; 0: there is none
+  /// 1 over the edges along x, y, z of a cell, whose faces count as walls, 0 where none repeats: [1/m], or
+  /// times d in a cell that follows a stress (ContactEquation::branch).
+  Vec3 faces = Vec3::Zero();
 };
 
 /// The distance to an answer of every cluster (cluster_solver.hpp), all of which must be small. Without

@@ -101,6 +101,11 @@ WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_
   const std::size_t end = begin + static_cast<std::size_t>(contacts.count[chunk]);
   const Wall& wall = poses.walls[static_cast<std::size_t>(chunks.wall[chunk])];
   for (std::size_t k = begin; k < end; ++k) {
+    if (!contacts.arm.empty()) {
+      const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
+      sums.torque += moment;
+      if (!contacts.spin.empty()) sums.drift += moment.dot(contacts.spin[k]);
+    }
     const Vec3 r = contact_impulse(contacts, k);
     if (r == Vec3::Zero()) continue;
     const auto i = static_cast<std::size_t>(contacts.first[k]);
@@ -111,10 +116,6 @@ WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_
                    poses.radius[i] * contact_normal(contacts, k));
     sums.torque += poses.domain.separation(point, measure.about).cross(r);
     sums.drift += r.dot(drift_of(contacts, k));
-    if (contacts.arm.empty()) continue;
-    const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
-    sums.torque += moment;
-    if (!contacts.spin.empty()) sums.drift += moment.dot(contacts.spin[k]);
   }
   return sums;
 }

@@ -50,8 +50,8 @@ Wishes wishes_of(BodyProblem& problem, const PartGroups& part, std::span<const T
     if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
       wishes.pressed[g] += std::abs(c.normal.dot(r));
     if (c.cell >= 0)  // what its faces carry, as walls would
-      wishes.pressed[g] +=
-          c.reach / problem.bodies[static_cast<std::size_t>(c.cell)].radius * std::abs(c.normal.dot(r));
+      wishes.pressed[g] += c.branch.norm() / problem.bodies[static_cast<std::size_t>(c.cell)].radius *
+                           std::abs(c.normal.dot(r));
     wishes.fastest[g] = std::max(wishes.fastest[g], c.offset.norm());
     const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
     const Vec3 shifted = v + shift * c.normal;

@@ -59,7 +59,7 @@ struct ContactEquation {
   std::int32_t place = -1;         ///< in `Contacts`
   std::int32_t wall = -1;          ///< number of the wall; -1 between bodies
   std::int32_t cell = -1;          ///< unknown; -1 where no cell follows a stress
-  double reach = 0;                ///< |b|/d there
+  Vec3 branch = Vec3::Zero();      ///< b/d there
   double drive = 0;                ///< speed of the driven wall [m/s]; 0 between bodies
   const Levers* levers = nullptr;  ///< of a contact of blocks, in `Contacts`
 };
@@ -162,14 +162,14 @@ Vec3 relative_velocity_of_spheres(const Contact& c, std::span<const Twist> V) {
 /// U b/d of the cell of a contact [m/s].
 inline Vec3 velocity_of_cell(const ContactEquation& c, std::span<const Twist> V) {
   const auto& [u, w] = V[static_cast<std::size_t>(c.cell)];
-  return velocity_at({u[0], u[1], u[2], w[0], w[1], w[2]}, c.reach * c.normal);
+  return velocity_at({u[0], u[1], u[2], w[0], w[1], w[2]}, c.branch);
 }
 
 inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
-  if (c.cell >= 0) return relative_velocity_of_spheres(c, V) + velocity_of_cell(c, V);
-  if (c.levers == nullptr) return relative_velocity_of_spheres(c, V);
+  const Vec3 flow = c.cell >= 0 ? velocity_of_cell(c, V) : Vec3(Vec3::Zero());
+  if (c.levers == nullptr) return relative_velocity_of_spheres(c, V) + flow;
   const Twist& a = V[static_cast<std::size_t>(c.first)];
-  const Vec3 v = a.u + c.levers->first * a.w;
+  const Vec3 v = a.u + c.levers->first * a.w + flow;
   if (c.second < 0) return v;
   const Twist& b = V[static_cast<std::size_t>(c.second)];
   return v - b.u - c.levers->second * b.w;
@@ -217,7 +217,7 @@ void add_force_of_spheres(const Contact& c, const Vec3& r, std::span<Twist> F) {
 /// The cell's part of F += H r, before `restrict_to_freedoms`.
 inline void add_force_on_cell(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
   CellVelocity f{};
-  add_impulse(r, c.reach * c.normal, f);
+  add_impulse(r, c.branch, f);
   Twist& cell = F[static_cast<std::size_t>(c.cell)];
   cell.u += Vec3(f[0], f[1], f[2]);
   cell.w += Vec3(f[3], f[4], f[5]);

@@ -38,7 +38,7 @@ void BodySystem::add_block_of_blocks(const ContactEquation& contact, double rho)
 /// The same for the cell that a contact pushes.
 void BodySystem::add_block_of_cell(const ContactEquation& contact, double rho) {
   touched_[at(contact.cell)] = 1;
-  const Vec3 b = contact.reach * contact.normal;
+  const Vec3& b = contact.branch;
   Eigen::Matrix<double, 3, 6> motion;
   motion << b[0], 0, 0, b[1], b[2], 0, 0, b[1], 0, 0, 0, b[2], 0, 0, b[2], 0, 0, 0;
   if (contact.mu == 0) motion = (contact.normal * (contact.normal.transpose() * motion)).eval();

@@ -129,7 +129,7 @@ ContactEquation StepReader::equation_at(std::size_t chunk, std::size_t place) co
   }
   if (has_cell()) {
     contact.cell = cell();
-    contact.reach = w < 0 ? contacts.reach[place] : 0;
+    if (w < 0) contact.branch = contacts.reach[place] * contact.normal;
   }
   contact.place = static_cast<std::int32_t>(place);
   contact.wall = w;

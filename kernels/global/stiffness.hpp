@@ -36,7 +36,7 @@ double effective_mass_by(const Mass& mass, const ContactEquation& c) {
   const auto mobility = [&](std::int32_t body) {
     return body < 0 ? 0 : 1 / mass(static_cast<std::size_t>(body));
   };
-  return 1 / (mobility(c.first) + mobility(c.second) + c.reach * c.reach * mobility(c.cell));
+  return 1 / (mobility(c.first) + mobility(c.second) + c.branch.squaredNorm() * mobility(c.cell));
 }
 inline double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
   return effective_mass_by([&](std::size_t body) { return problem.bodies[body].mass; }, c);

@@ -52,8 +52,8 @@ struct Wall {
   Vec3 omega = Vec3::Zero();            ///< [rad/s] now, beside `velocity`, which then is that of the
   Vec3 pivot = Vec3::Zero();            ///< point [m] here
   RigidVelocity belt = {};              ///< of the material in its surface, against the surface
-  RigidVelocity came = {};  ///< with which a prescribed motion brought it here from the middle of the step
-                            ///< before
+  RigidVelocity came = {};  ///< with which, in a time step, a prescribed motion comes as far as it has since
+                            ///< the middle of the step before
   Vec3 torque_point = Vec3::Constant(std::nan(""));  ///< in its first place: about which its torque is told
                                                      ///< [m]; not finite: found before the first step
   std::string from_stage = {}, until_stage = {};  ///< there from, and until, the beginning of these; empty:

@@ -292,9 +292,13 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
   double walls = 0;
   for (const WallState& wall : state_.wall_states) walls = std::max(walls, wall.impulse.norm());
-  const double edge = state_.domain.flows && !state_.cell.loaded() ? state_.domain.edges().maxCoeff() : 0;
-  StepError error = step_error(
-      problems_, *link_, {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls, .edge = edge});
+  Vec3 faces = Vec3::Zero();
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (const double edge = state_.domain.edges()[axis]; state_.domain.repeats && edge > 0)
+      faces[axis] = (state_.cell.loaded() ? state_.cell.length : 1) / edge;
+  StepError error =
+      step_error(problems_, *link_,
+                 {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls, .faces = faces});
   change_ = std::move(error.change);
   mends_ = error.mends;
   // For `correct` the contacts and their impulses are enough.

@@ -136,14 +136,28 @@ void demand_motion(double time, double h, const std::string& step, std::span<con
   for (const Wall& wall : walls) demand_rows(wall, time, h, step);
 }
 
-void prepare_walls(double time, double h, StepState& state, const graph::Communicator& ranks) {
+namespace {
+
+/// The velocity at which a wall comes, in h, as far as it has since the middle of a step before, of length
+/// `before`.
+RigidVelocity came_since(const Wall& wall, double time, double h, double before) {
+  const double since = 0.5 * (before + h);
+  RigidVelocity came = mean_velocity(wall.motion, time - 0.5 * before, since);
+  came.velocity *= since / h;
+  came.omega *= since / h;
+  return came;
+}
+
+}  // namespace
+
+void prepare_walls(double time, double h, double before, StepState& state, const graph::Communicator& ranks) {
   if (std::ranges::all_of(state.walls, [](const Wall& wall) { return wall.motion.empty(); })) return;
   bool planes_turn = false;
   for (std::size_t w = 0; w < state.walls.size(); ++w) {
     Wall& wall = state.walls[w];
     if (wall.motion.empty()) continue;
     set_velocities(time, h, wall);
-    wall.came = mean_velocity(wall.motion, time - 0.5 * h, h);
+    wall.came = came_since(wall, time, h, before);
     state.wall_states[w].middle = pose_at(wall.motion, time + 0.5 * h);
     state.wall_states[w].end = pose_at(wall.motion, time + h);
     planes_turn |= wall.surface() == nullptr && turns(wall);

@@ -33,7 +33,7 @@ void demand_motion(double time, double h, const std::string& step, std::span<con
 
 /// Finds the velocities of the walls in the step, and where they are in its middle and at its end. Collective
 /// where a plane turns.
-void prepare_walls(double time, double h, StepState& state, const graph::Communicator& ranks);
+void prepare_walls(double time, double h, double before, StepState& state, const graph::Communicator& ranks);
 
 /// Bound on how much nearer to any grain a wall's surface has come since the time `then` [m]. `first`: the
 /// wall in its first place.

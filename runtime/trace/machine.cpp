@@ -19,12 +19,13 @@ namespace {
 }
 
 void demand_positive(double value, const char* name) {
-  if (!(value > 0) || !std::isfinite(value)) refuse(fmt::format("{} must be above 0, got {}", name, value));
+  if (!(value > 0) || !std::isfinite(value))
+    refuse(fmt::format("{} must be above 0 and finite, got {}", name, value));
 }
 
 void demand_not_negative(double value, const char* name) {
   if (!(value >= 0) || !std::isfinite(value))
-    refuse(fmt::format("{} must not be negative, got {}", name, value));
+    refuse(fmt::format("{} must be finite and not negative, got {}", name, value));
 }
 
 /// Median time from the start of a message to its arrival, of those that somebody was waiting for: only then

@@ -136,7 +136,11 @@ void Timeline::add(const Track& track, std::uint32_t number, StepIndex& index) c
                                      rank.nodes, track.rank));
       const auto epoch = static_cast<std::size_t>(it->epoch);
       reach_epoch(rank, epoch);
-      rank.node[epoch * rank.nodes + it->node] = place;
+      Place& once = rank.node[epoch * rank.nodes + it->node];
+      if (once.exists())
+        throw TraceError(fmt::format("step {}: node {} of epoch {} was recorded twice on rank {}", index.step,
+                                     it->node, epoch, track.rank));
+      once = place;
     } else if (it->node < tasks.size() && tasks[it->node].kind == kind && !tasks[it->node].team) {
       rank.task[it->node] = last_task = place;
     } else if (within(*it, last_task)) {

@@ -245,7 +245,7 @@ struct Simulation::Implementation {
   void choose_time_step() {
     set_walls(setup, report.time, parameters.time_step, state);
     if (!stage().chooses_time_step) return;
-    prepare_walls(report.time, parameters.time_step, state, ranks);
+    prepare_walls(report.time, parameters.time_step, step_before(), state, ranks);
     double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
     // Grains to be inserted in the step are not among the bodies yet.
     if (const double speed = population.fastest(span()); speed > 0)
@@ -254,6 +254,8 @@ struct Simulation::Implementation {
     take_time_step(clock.step());
   }
 
+  /// Length of the last step [s]; before the first one, of that.
+  double step_before() const { return report.step > 0 ? report.time_step : parameters.time_step; }
   /// The step that is about to be made.
   StepSpan span() const {
     return {report.time, report.time + parameters.time_step, &stage(), stage_begins[stage_index]};
@@ -316,7 +318,7 @@ struct Simulation::Implementation {
           drive_cell(setup, {stage_index, report.time - stage_begins[stage_index]}, parameters, state, ranks),
           parameters.time_step, parameters.reflection, state.domain, state.flow);
     demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
-    prepare_walls(report.time, parameters.time_step, state, ranks);
+    prepare_walls(report.time, parameters.time_step, step_before(), state, ranks);
     apply_loads(parameters, next_step(), state);
   }
 

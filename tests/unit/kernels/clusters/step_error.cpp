@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
+#include "kernels/clusters/clusters.hpp"
 #include "tests/unit/kernels/clusters/cluster_makers.hpp"
 
 namespace talus::step_error_test {
@@ -47,6 +49,87 @@ TEST(StepError, OfAColumnIsNotHiddenByGrainsAtRestBesideIt) {
   const StepError error = step_error(problem, {.enough = 1e-4});
   EXPECT_NEAR(error.velocity, 0.3 / 0.7, 1e-3) << "momentum missing, over what contacts have exchanged";
   EXPECT_NEAR(error.contact, 0.3, 1e-6);
+}
+
+/// Three grains in a row that fills a cell along x, which a pressure closes with `momentum`: impulses `part`
+/// of what they carry.
+BodyProblem row_in_a_cell(double momentum, double part) {
+  BodyProblem problem;
+  for (int k = 0; k < 3; ++k) {
+    add_grain(problem, Vec3(0.02 * k, 0, 0), 0);
+    problem.bodies.back().free.u = Vec3::Zero();
+  }
+  for (std::int32_t k = 0; k < 3; ++k) {
+    add_contact(problem, (k + 1) % 3, k, Vec3::UnitX(), 0);
+    problem.contacts.back().cell = 3;
+    problem.contacts.back().branch = Vec3::UnitX();  // d is a diameter
+    problem.impulse.back() = part * momentum / 3 * Vec3::UnitX();
+  }
+  BodyUnknown cell;
+  cell.cell = true;
+  cell.mass = cell.spin_mass = 3;
+  cell.radius = 3;  // its edge over d
+  cell.axis = Vec3::Ones();
+  cell.shears = Vec3(1, 0, 0);
+  cell.free.u = Vec3(-momentum / cell.mass, 0, 0);
+  problem.bodies.push_back(cell);
+  return problem;
+}
+
+/// Its edge is three diameters.
+const ErrorGoal in_cell{.enough = 1e-4, .faces = {1.0 / 3, 0, 0}};
+
+TEST(StepError, OfACellUnderAStressIsThatOfWhatItsContactsCarry) {
+  for (const double part : {0.0, 0.5, 0.9}) {
+    BodyProblem problem = row_in_a_cell(0.6, part);
+    const StepError error = step_error(problem, in_cell);
+    EXPECT_NEAR(error.contact, 1 - part, 1e-6) << part;
+    EXPECT_NEAR(error.wall, 1 - part, 1e-6) << "its face across x, " << part;
+    if (part > 0) {
+      EXPECT_NEAR(error.velocity, (1 - part) / part, 1e-6) << part;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      problem.impulse[k] += error.change[0][k];
+      EXPECT_NEAR(problem.impulse[k][0], 0.2, 1e-7) << part;
+    }
+    EXPECT_LT(step_error(problem, in_cell).relative(), 1e-6) << part;
+  }
+}
+
+TEST(StepError, OfACellUnderAStressIsOneClusterThoughItsGrainsTouchInPairs) {
+  BodyProblem problem = row_in_a_cell(0.6, 0);
+  problem.contacts[1] = problem.contacts[0];
+  problem.contacts[1].first = problem.contacts[1].second = 2;  // its own image
+  problem.contacts.resize(2);
+  problem.impulse.resize(2);
+  const PartLink alone;
+  const std::vector<ContactGraph> graphs{graph_of(problem)};
+  const Clusters clusters = clusters_of(graphs, alone);
+  EXPECT_EQ(clusters.of_body[0][0], clusters.of_body[0][2]);
+  EXPECT_EQ(clusters.of_body[0][0], clusters.of_body[0][3]) << "the cell is one of it";
+}
+
+/// Two grains in a cell whose flow is given.
+TEST(StepError, OfACellWhoseFlowIsGivenHasFaces) {
+  BodyProblem problem;
+  for (int k = 0; k < 2; ++k) {
+    add_grain(problem, Vec3(0.02 * k, 0, 0), 0);
+    problem.bodies.back().free.u = Vec3((0.5 - k) * 0.2, 0, 0);
+  }
+  add_contact(problem, 1, 0, Vec3::UnitX(), 0);
+  problem.impulse.back() = 0.07 * Vec3::UnitX();  // of 0.1
+  EXPECT_EQ(step_error(problem, {.enough = 1e-4}).wall, 0) << "no cell";
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4, .faces = {10, 0, 0}}).wall, 0.3, 1e-6);
+}
+
+TEST(StepError, OfForcesInSlowPlacesIsNotHiddenByAFastWall) {
+  for (const double drive : {0.0, 100.0}) {
+    BodyProblem problem;
+    add_column(problem, 3, 0, 0.7);
+    problem.contacts[0].drive = drive;
+    const StepError error = step_error(problem, {.enough = 1e-4});
+    EXPECT_NEAR(error.contact, 0.3, 1e-6) << drive;
+  }
 }
 
 TEST(StepError, IsNoneWhereTheLawHoldsAndWhereThereIsNoContact) {

@@ -271,18 +271,6 @@ TEST(Population, ACheckpointOfOtherRulesIsRefused) {
 }
 
 /// Large grains are not left out because they fit less often.
-TEST(Population, ARemovalAtATimeOutsideItsOwnTimesIsRefused) {
-  talus::Setup setup = floor_setup(10);
-  setup.removes = {removal(below(0))};
-  RemoveRule& rule = setup.removes.front();
-  rule.at = {0.05};
-  EXPECT_NO_THROW(validate(setup));
-  rule.times.from = 0.06;
-  EXPECT_THROW(validate(setup), std::invalid_argument) << "it would act late";
-  rule.times = {.from = 0, .until = 0.01, .stage = {}, .interval = 0};
-  EXPECT_THROW(validate(setup), std::invalid_argument) << "it would never act";
-}
-
 TEST(Population, RadiiThatComeAreThoseOfTheDistribution) {
   talus::Setup setup = floor_setup(300);
   setup.inserts.push_back(rain(600));
@@ -297,6 +285,18 @@ TEST(Population, RadiiThatComeAreThoseOfTheDistribution) {
   std::ranges::sort(radii);
   std::ranges::sort(drawn);
   EXPECT_EQ(radii, drawn);
+}
+
+TEST(Population, ARemovalAtATimeOutsideItsOwnTimesIsRefused) {
+  talus::Setup setup = floor_setup(10);
+  setup.removes = {removal(below(0))};
+  RemoveRule& rule = setup.removes.front();
+  rule.at = {0.05};
+  EXPECT_NO_THROW(validate(setup));
+  rule.times.from = 0.06;
+  EXPECT_THROW(validate(setup), std::invalid_argument) << "it would act late";
+  rule.times = {.from = 0, .until = 0.01, .stage = {}, .interval = 0};
+  EXPECT_THROW(validate(setup), std::invalid_argument) << "it would never act";
 }
 
 TEST(Population, TheSameBitsOnAnyThreads) {

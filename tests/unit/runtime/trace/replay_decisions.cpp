@@ -217,6 +217,15 @@ TEST(ReplayDecisions, LongerChunksAreAddedUpAsFast) {
                    makespan(test::two_subdomains(1), machine) + 90);
 }
 
+TEST(ReplayDecisions, ATraceThatHasANodeTwiceIsRefused) {
+  Trace trace = with_a_look();
+  Track& track = trace.tracks.front();
+  const auto node = std::ranges::find_if(track.records, [](const Record& r) { return r.epoch == 0; });
+  ASSERT_NE(node, track.records.end());
+  track.records.insert(node, Record(*node));
+  EXPECT_THROW(makespan(trace, bare(1, 1)), TraceError);
+}
+
 TEST(TaskTimes, AreThoseOfTheReplay) {
   const Trace trace = with_a_look();
   TaskTimes times(trace, 2, 1);
