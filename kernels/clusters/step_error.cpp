@@ -79,13 +79,6 @@ double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
                    thresholds.rounding * most_momentum(row[mass], row[incoming])});
 }
 
-/// The same cluster with nothing driven: forces may be small where walls or a flow are fast, and are asked
-/// for all the same.
-Measures standing(Measures row) {
-  row[drive] = 0;
-  return row;
-}
-
 /// Where the answers of clusters come together: those that several processes hold count in one of them.
 class Answers {
  public:
@@ -97,7 +90,7 @@ class Answers {
     }
     answers_.resize(clusters_.size());
     scales_.resize(clusters_.size());
-    exchanges_.resize(clusters_.size());
+    noise_.resize(clusters_.size());
   }
 
   void solve(const ErrorGoal& goal) {
@@ -113,7 +106,7 @@ class Answers {
           rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
       scales_[c] =
           std::max({scale_of(rows[c], thresholds_), thresholds_.interest * everywhere * share, still});
-      exchanges_[c] = larger(scale_of(standing(rows[c]), thresholds_), still);
+      noise_[c] = std::max(thresholds_.rounding * most_momentum(rows[c][mass], rows[c][incoming]), still);
       answers_[c] = solve_cluster(clusters_[c].problem, {goal.enough * scales_[c], goal.enough, goal.sweeps},
                                   thresholds_.cluster);
     });
@@ -179,13 +172,12 @@ class Answers {
     return talus::largest_impulse(clusters_[c].problem, answers_[c].found);
   }
   /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times
-  /// that of all, or of what the cluster's bodies exchange.
+  /// that of all, or what rounding leaves. How fast walls or a flow are says nothing of forces.
   double contact_error(std::size_t c, double most) const {
     double change = 0;
     for (const Vec3& by : answers_[c].found) change = larger(change, by.norm());
     if (change == 0) return 0;
-    const double interest = thresholds_.interest;
-    return change / std::max({largest_impulse(c), interest * most, interest * exchanges_[c]});
+    return change / std::max({largest_impulse(c), thresholds_.interest * most, noise_[c]});
   }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least
   /// ErrorGoal::walls: the largest.
@@ -241,10 +233,9 @@ class Answers {
   const StepErrorThresholds& thresholds_;
   std::vector<std::vector<std::size_t>> own_;  ///< per part: clusters that it answers for
   std::vector<ClusterAnswer> answers_;
-  std::vector<double> scales_;     ///< [N s]
-  std::vector<double> exchanges_;  ///< what forces are no less than a part of: as if nothing were driven, and
-                                   ///< each cluster stood alone [N s]
-  Exchanged exchanged_;            ///< by all of them
+  std::vector<double> scales_;  ///< [N s]
+  std::vector<double> noise_;   ///< what rounding leaves of momenta [N s]
+  Exchanged exchanged_;         ///< by all of them
 };
 
 }  // namespace
