@@ -101,7 +101,8 @@ TEST(CertificateScenes, OneSeedIsOneScene) {
 TEST(CertificateScenes, OfEveryFamilyAreOfItsSizeAndRun) {
   for (const SceneFamily& family : scene_families())
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      const MadeScene made = make_scene(family.name, seed, {});
+      MadeScene made = make_scene(family.name, seed, {});
+      made.scene.setup.solver.direct_bodies = 0;  // whether its steps are right is not asked here
       EXPECT_GE(made.grains.size(), 1U);
       EXPECT_LE(made.grains.size(), 200U) << made.name();
       const AuditedRun run = audited(made, 2);
