@@ -168,9 +168,9 @@ int solve(const SolveOptions& options, const Plan& plan) {
             file.path.string(), solved.failed_contacts);
       if (solved.approach > std::max(most_approach, 10 * options.tol))
         print_error(
-            "talus: warning: {}: contacts still close at {:.2g} of the largest velocity in q, beside "
-            "impulses "
-            "so large that the error, which is relative to them, is within its tolerance: there may be no "
+            "talus: warning: {}: contacts still close at {:.2g} of the largest velocity in q. The error, "
+            "which "
+            "is relative to the impulses, is within its tolerance as these are large: there may be no "
             "solution\n",
             file.path.string(), solved.approach);
       rows.push_back(std::move(solved.row));

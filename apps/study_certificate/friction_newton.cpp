@@ -21,6 +21,10 @@ constexpr double inner_part = 1e-2;
 constexpr double pumped = 1e6;
 /// Least momentum exchanged, kinetic norm, over the largest impulse.
 constexpr double floor_of_exchange = 1e-2;
+/// Of a system with a cell, solved by parts: so many refinements at most, until so much of its right side is
+/// left.
+constexpr int refinements = 4;
+constexpr double left_of_system = 1e-9;
 
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
@@ -160,8 +164,6 @@ void FrictionNewton::derivative(const Vector& z, std::size_t c, Eigen::Matrix3d&
 }
 
 bool FrictionNewton::solve_with_cell(const Matrix& J, const Matrix& P, const Matrix& S, Vector& x) const {
-  constexpr int refinements = 4;
-  constexpr double enough = 1e-9;
   const Eigen::MatrixXd back = S * cell_, there = P * back;
   const Vector right = x;
   const Eigen::SparseLU<Matrix> factor(J);
@@ -172,7 +174,7 @@ bool FrictionNewton::solve_with_cell(const Matrix& J, const Matrix& P, const Mat
     x.setZero();
     for (int k = 0; k < refinements; ++k) {
       const Vector left = right - J * x - there * (back.transpose() * x);
-      if (k > 0 && left.norm() <= enough * right.norm()) return x.allFinite();
+      if (k > 0 && left.norm() <= left_of_system * right.norm()) return x.allFinite();
       const Vector alone = factor.solve(left);
       x += alone - beside * small.solve(back.transpose() * alone);
     }

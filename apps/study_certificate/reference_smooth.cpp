@@ -31,6 +31,10 @@ constexpr Real nearest_shift = 10;
 constexpr Real sharpness = 1e-4L;
 /// Least momentum exchanged, kinetic norm, over the largest impulse.
 constexpr Real floor_of_exchange = 1e-2L;
+/// Of the interior point method: steps at most; s y at its end, over its scale; part of the way to the border
+/// that a step goes.
+constexpr int steps_within = 80;
+constexpr Real least_product = 1e-26L, to_the_border = 0.99L;
 
 /// The dual problem, in impulses times sqrt(W_cc): y = W s + q, s >= 0, y >= 0, s.y = 0, diagonal of W 1.
 struct Dual {
@@ -214,10 +218,8 @@ Met met_by(const Dual& dual, const Vector& s) {
 
 /// The answer to y = (W + shift) s + q by an interior point method with predictor and corrector (Mehrotra
 /// 1992), which needs no guess of what carries: to about the digits that are left where s y has come down to
-/// `least` of its scale.
+/// `least_product` of its scale.
 Vector from_within(const Dual& dual, const Vector& q, Real shift) {
-  constexpr int most = 80;
-  constexpr Real least = 1e-26L, back = 0.99L;
   const Eigen::Index count = q.size();
   Dense W = Dense(dual.W) + dual.cell * dual.cell.transpose();
   W.diagonal().array() += shift;
@@ -229,10 +231,11 @@ Vector from_within(const Dual& dual, const Vector& q, Real shift) {
       if (step[c] < 0) part = std::min(part, -at[c] / step[c]);
     return part;
   };
-  for (int step = 0; step < most; ++step) {
+  for (int step = 0; step < steps_within; ++step) {
     const Vector apart = W * s + q - y;
     const Real gap = s.dot(y) / static_cast<Real>(count);
-    if (gap < least * scale * scale && apart.cwiseAbs().maxCoeff() < std::sqrt(least) * scale) break;
+    if (gap < least_product * scale * scale && apart.cwiseAbs().maxCoeff() < std::sqrt(least_product) * scale)
+      break;
     Dense system = W;
     system.diagonal() += y.cwiseQuotient(s);
     const Eigen::LDLT<Dense> factor(system);
@@ -249,7 +252,7 @@ Vector from_within(const Dual& dual, const Vector& q, Real shift) {
         closed - ds.cwiseProduct(dy) + Vector::Constant(count, ahead * ahead * ahead * gap);
     towards(centred, ds, dy);
     if (!ds.allFinite() || !dy.allFinite()) break;
-    const Real way = std::min(Real{1}, back * std::min(farthest(s, ds), farthest(y, dy)));
+    const Real way = std::min(Real{1}, to_the_border * std::min(farthest(s, ds), farthest(y, dy)));
     s += way * ds;
     y += way * dy;
   }

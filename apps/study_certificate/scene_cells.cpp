@@ -34,12 +34,14 @@ std::vector<double> draw_radii_of_cell(SceneBench& bench, double solid, double& 
   return radii;
 }
 
+/// Rounds of push_apart at most, and the part of an overlap that each takes away: several act on a grain.
+constexpr int push_rounds = 400;
+constexpr double push_share = 0.4;
+
 /// Pushes overlapping pairs apart along their nearest images, the lighter one farther.
 void push_apart(const StepCell& cell, const std::vector<double>& radii, std::vector<Vec3>& x) {
-  constexpr int rounds = 400;
-  constexpr double share = 0.4;  // of an overlap: several act on each grain
   std::vector<Vec3> way(x.size());
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < push_rounds; ++round) {
     std::ranges::fill(way, Vec3::Zero());
     bool any = false;
     for (std::size_t i = 0; i < x.size(); ++i)
@@ -49,8 +51,8 @@ void push_apart(const StepCell& cell, const std::vector<double>& radii, std::vec
         if (overlap <= 0 || distance == 0) continue;
         any = true;
         const double a = std::pow(radii[i], 3), b = std::pow(radii[j], 3);
-        way[i] += share * overlap * b / (a + b) / distance * d;
-        way[j] -= share * overlap * a / (a + b) / distance * d;
+        way[i] += push_share * overlap * b / (a + b) / distance * d;
+        way[j] -= push_share * overlap * a / (a + b) / distance * d;
       }
     if (!any) return;
     for (std::size_t k = 0; k < x.size(); ++k) x[k] += way[k];

@@ -60,9 +60,12 @@ std::string default_text(const Key<Part>& key) {
   return text.empty() ? "none" : "`" + text + "`";
 }
 
-/// The text in lines of at most `width` characters; a blank in code may become the end of a line, which
+/// Of a line, but of tables [characters].
+constexpr std::size_t page_width = 110;
+
+/// The text in lines of at most `page_width`; a blank in code may become the end of a line, which
 /// Markdown takes for a blank.
-std::string in_lines(std::string_view text, std::size_t width) {
+std::string in_lines(std::string_view text) {
   std::string out;
   std::size_t used = 0;
   while (!text.empty()) {
@@ -72,7 +75,7 @@ std::string in_lines(std::string_view text, std::size_t width) {
     // Bytes that go on with a character of UTF-8 begin with the bits 10.
     const auto length = static_cast<std::size_t>(std::ranges::count_if(
         word, [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) != 0x80; }));
-    const bool fits = used + 1 + length <= width;
+    const bool fits = used + 1 + length <= page_width;
     if (used > 0) out += fits ? ' ' : '\n';
     used = used > 0 && fits ? used + 1 + length : length;
     out += word;
@@ -83,7 +86,7 @@ std::string in_lines(std::string_view text, std::size_t width) {
 template <class Part>
 std::string section_text(const Section<Part>& section) {
   std::string out = fmt::format("\n## {}\n\n", section.header.empty() ? "Top" : "`" + section.header + "`");
-  if (!section.meaning.empty()) out += in_lines(section.meaning, 110) + "\n\n";
+  if (!section.meaning.empty()) out += in_lines(section.meaning) + "\n\n";
   out += "| key | type | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |\n";
   for (const Key<Part>& key : section.keys)
     out += fmt::format("| `{}` | {} | {} | {} | {} | {}{} |\n", key.name, type_text(key), key.unit,

@@ -39,6 +39,7 @@ void prescribe_cell(const Setup& setup, const Stage& stage, const SampleSize& si
   for (std::size_t k = 0; k < cell_freedoms; ++k) cell.follows[k] = stage.stress.to[k].has_value();
   cell.mass = setup.cell_inertia * size.total_mass;
   cell.length = size.mean_diameter;
+  cell.grains = size.bodies;
 }
 
 CellDrive drive_cell(const Setup& setup, const StageMoment& at, const StepParameters& parameters,

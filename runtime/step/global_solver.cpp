@@ -210,22 +210,13 @@ double GlobalSolver::sweeps_needed(double spread) const {
   return estimate_stiffness(gather_graphs(), *link_);
 }
 
-double GlobalSolver::grains_everywhere() const {
-  const Decomposition& all = state_.decomposition;
-  if (!all.several()) return static_cast<double>(state_.bodies.size());
-  return total_of(*link_, all.here.size(), 1, [&](std::size_t p, std::span<double> row) {
-    const auto [begin, end] = all.slots_of(SubdomainPlace(static_cast<std::int32_t>(p)));
-    for (std::size_t s = begin; s < end; ++s) row[0] += all.counts[s] != 0 ? 1 : 0;
-  })[0];
-}
-
 void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   small_ = false;
   large_ = true;
   groups_ = {};
   const Whole span(*this);
   // A cell that follows a stress ties all contacts together.
-  if (state_.cell.loaded() && grains_everywhere() >= (parameters_.friction ? small.bodies : small.smooth))
+  if (state_.cell.loaded() && state_.cell.grains >= (parameters_.friction ? small.bodies : small.smooth))
     return;
   const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);

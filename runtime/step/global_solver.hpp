@@ -93,7 +93,6 @@ class GlobalSolver {
   template <class Gather>
   auto gather_parts(const BodyProblemSource& source, const Gather& gather) const;
   std::vector<ContactGraph> gather_graphs() const;
-  double grains_everywhere() const;  ///< in all subdomains, on all ranks. Collective
   std::vector<BodyProblem> gather() const;
   /// The problem with the impulses of the last check, read from the arrays of the step, which `source` names.
   std::vector<std::unique_ptr<const StepReader>> read_checked(const BodyProblemSource& source) const;

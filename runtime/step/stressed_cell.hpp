@@ -21,6 +21,7 @@ struct StressedCell {
   std::array<bool, cell_freedoms> follows{};  ///< components that follow a stress; none: no such cell
   double length = 0;                          ///< d [m]: its velocity is d G
   double mass = 0;                            ///< [kg]
+  std::int64_t grains = 0;                    ///< in it, on all ranks
   std::vector<CellCopy> copies;               ///< per chunk; void where it has no contacts
   std::vector<ChunkId> held;                  ///< chunks here whose copies count, ascending
   std::int64_t copies_everywhere = 0;         ///< on all ranks

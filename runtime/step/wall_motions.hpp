@@ -31,8 +31,9 @@ void set_walls(const Setup& setup, double time, double h, StepState& state);
 /// Throws RunawayError, in which `step` is named, when the table of a motion ends before the step does.
 void demand_motion(double time, double h, const std::string& step, std::span<const Wall> walls);
 
-/// Finds the velocities of the walls in the step, and where they are in its middle and at its end. Collective
-/// where a plane turns.
+/// Finds the velocities of the walls in the step of length h [s] from `time` on, how far they have come since
+/// the middle of the step before, of length `before` [s], and where they are in the middle and at the end of
+/// this one. Collective where a plane turns.
 void prepare_walls(double time, double h, double before, StepState& state, const graph::Communicator& ranks);
 
 /// Bound on how much nearer to any grain a wall's surface has come since the time `then` [m]. `first`: the

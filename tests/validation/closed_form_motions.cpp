@@ -364,6 +364,30 @@ TEST(Motion, ThatLeapsPastABallBetweenTheMiddlesOfStepsIsSaid) {
     }
 }
 
+/// The same where the last step was longer: its middle lies farther back than half of this one.
+TEST(Motion, ThatLeapsPastABallAsTheTimeStepChangesIsSaid) {
+  Scene scene(4 * h);
+  scene.surface("disc", {{"centre", {-2 * radius, 0, 0}}, {"axis", {1, 0, 0}}, {"radius", {1}}});
+  MotionTable table{.t = {0, 0.0103, 0.011, 1}, .shift = {}, .velocity = {}, .angle = {}};
+  for (const double x : {0.0, 0.0, 3 * radius, 3 * radius}) table.shift.emplace_back(x, 0, 0);
+  scene.setup.walls.back().motion = {
+      MotionPart{.kind = MotionPart::Kind::table, .table = std::make_shared<MotionTable>(table)}};
+  scene.stage().laws.set_all(&PairLaw::restitution, 0.5);
+  scene.stage().end.steps = 3;  // the last one's middle is at 0.01 s
+  scene.setup.stages.push_back(scene.setup.stages.back());
+  scene.setup.stages.back().time_step = h;  // the first one's is at 0.0125 s
+  scene.setup.stages.back().end.steps = 10;
+  scene.sphere({0, 0, 0}, radius, 0.7);
+  Experiment run(std::move(scene));
+  std::int64_t passed = 0;
+  for (int k = 0; k < 8; ++k) {
+    passed += run.step().passed;
+    run.next_stage();
+  }
+  EXPECT_EQ(run.u(), Vec3::Zero()) << "else it has not been passed";
+  EXPECT_GT(passed, 0);
+}
+
 TEST(Motion, ChoosesTimeStepsThatFollowIt) {
   Scene scene(h);
   scene.wall("plate", Vec3::Zero(), Vec3::UnitZ()).motion = {oscillation(Vec3::UnitZ(), 1e-3, 40)};

@@ -91,8 +91,8 @@ Section<RemoveRule> remove_keys() {
   return {
       "[[remove]]",
       "Grains that go: those whose centre is in `[remove.region]`. removed.csv counts them and their mass, "
-      "for each material. The first of several rules takes a grain. Not in a periodic cell, where "
-      "no grain can come either.",
+      "for each material. The first of several rules takes a grain. Not in a periodic cell, where no "
+      "grain can come either.",
       std::move(keys)};
 }
 

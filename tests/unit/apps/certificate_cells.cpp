@@ -121,7 +121,6 @@ TEST(CertificateCells, AtRestContactsCarryWhatTheStressPressesTheFacesWith) {
   ASSERT_EQ(answer.found, Found::answer);
   const double carried = Row::pressure * Row::width * Row::width * Row::time_step;
   for (const Vec3& r : answer.exact) EXPECT_NEAR(r.norm(), carried, 1e-9 * carried);
-  EXPECT_LT(answer.motion.cell.norm(), 10 * problem.cell.gain.norm() * problem.cell.length);
   EXPECT_NEAR(answer.motion.cell[0], -problem.cell.gain(0, 0) * problem.cell.length,
               1e-9 * answer.motion.cell.norm());
 }

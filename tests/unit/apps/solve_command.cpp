@@ -129,6 +129,8 @@ TEST_F(SolveCommand, SaysWhereContactsStillCloseThoughTheErrorIsSmall) {
   EXPECT_NE(without.output.find(warns), std::string::npos) << without.output;
   const Outcome with = talus("solve " + write_chain(folder_ / "open.hdf5", 2).string(), true);
   EXPECT_EQ(with.output.find(warns), std::string::npos) << with.output;
+  const Outcome loose = talus("solve --tol 0.5 " + write_chain(folder_ / "long.hdf5", 40).string(), true);
+  EXPECT_EQ(loose.output.find(warns), std::string::npos) << "so much was asked for: " << loose.output;
 }
 
 TEST_F(SolveCommand, WritesASolutionThatStandsUpToTheErrorItReports) {
