@@ -8,6 +8,7 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "kernels/bodies/larger.hpp"
+#include "kernels/clusters/step_error.hpp"
 
 namespace talus {
 
@@ -178,7 +179,17 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         simulation.setup().solver.overlap_tolerance, tally.deepest.overlap,
         name_of(*tally.deepest.overlapping, simulation.setup().walls), tally.deepest.step,
         remedy_of_overlaps(tally, simulation.setup().walls));
-  if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > 0)
+  const SolverSettings& solver = simulation.setup().solver;
+  if (solver.direct_bodies > 0 && tally.unconverged > tally.jammed &&
+      tally.worst_balance >= StepErrorThresholds{}.unknown)
+    terminal.warn(
+        "warning: where `balance` in steps.csv is 1 or more nothing is known of some small cluster of "
+        "contacts: within {} sweeps its direct solve found no answer. Raise solver.max_iterations, or leave "
+        "such clusters to estimates, which may take a wrong step for right: solver.direct_bodies = 0 "
+        "(docs/certificate.md)",
+        solver.max_iterations);
+  // Of steps that other tolerances missed it says nothing.
+  if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > solver.tolerance)
     terminal.warn(
         "warning: of the steps that missed, step {} is the furthest off: at the contact of {} by {:.2g} of "
         "its velocities, and {} by {:.2g}; worst_* in steps.csv name those of each",

@@ -91,8 +91,11 @@ void print(const ordered_json& status) {
   if (status.contains("stage"))
     text += fmt::format("stage '{}', {:.0f} % done\n", status["stage"].get<std::string>(),
                         100 * status.value("stage_fraction", 0.0));
-  text += fmt::format("step {}, {:.6g} s simulated, {} steps missed the tolerance\n",
-                      status["step"].get<std::int64_t>(), status["time"].get<double>(),
+  // Its last sign of life may be older than its last checkpoint.
+  const bool lost = status["state"] == "dead" || status["state"] == "silent";
+  text += fmt::format("{}step {}, {:.6g} s simulated, {} steps missed the tolerance\n",
+                      lost ? "when last heard of: " : "", status["step"].get<std::int64_t>(),
+                      status["time"].get<double>(),
                       status["missed_steps"].get<std::int64_t>());
   if (status.contains("steps_per_s"))
     text += fmt::format("{:.3g} steps a second", status["steps_per_s"].get<double>()) +

@@ -175,6 +175,8 @@ int view_command(const ViewCommandOptions& options) {
   const fs::path out = options.out.empty() ? fs::path(options.run) / "view.png" : fs::path(options.out);
   std::string image;
   try {
+    if (out.extension() != ".svg" && out.extension() != ".png")
+      throw std::invalid_argument(fmt::format("--out {}: a view is a .png or a .svg", out.string()));
     const Viewed viewed(options);
     const int frames = static_cast<int>(viewed.frames());
     const int k = options.frame < 0 ? frames + options.frame : options.frame;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <span>
 #include <string>
 
 #include "apps/shared/patience.hpp"
@@ -85,12 +86,19 @@ std::vector<Vec3> sites_in_region(const io::Scene& scene, const io::SampleSpec& 
   return sites;
 }
 
-std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std::vector<double>& radii) {
+/// Sample k, among the grains of those `before`.
+std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std::vector<double>& radii,
+                                std::span<const Sample> before) {
   const io::SampleSpec& spec = scene.samples[k];
   const Domain& domain = scene.setup.domain;
   const Bounds box = spec.region ? bounds_of(*spec.region) : Bounds{domain.low, domain.low + domain.edges()};
+  StandingGrains stand;
+  for (const Sample& other : before) {
+    stand.x.insert(stand.x.end(), other.x.begin(), other.x.end());
+    stand.radius.insert(stand.radius.end(), other.radius.begin(), other.radius.end());
+  }
   try {
-    return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)});
+    return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)}, stand);
   } catch (const std::invalid_argument& error) {
     throw io::SceneError(scene.source_file, 0, fmt::format("sample[{}].count", k), error.what());
   }
@@ -105,8 +113,8 @@ void set_velocity(const io::SampleSpec& spec, Sample& sample) {
   }
 }
 
-/// Sample `k` of the scene.
-Sample make_part(const io::Scene& scene, std::size_t k) {
+/// Sample `k` of the scene, behind those `before`.
+Sample make_part(const io::Scene& scene, std::size_t k, std::span<const Sample> before) {
   using Kind = io::SampleSpec::Kind;
   const io::SampleSpec& spec = scene.samples[k];
   if (spec.kind == Kind::bodies)
@@ -125,7 +133,7 @@ Sample make_part(const io::Scene& scene, std::size_t k) {
   } else if (spec.kind == Kind::random) {
     demand_memory(scene, static_cast<double>(spec.count));
     sample.radius = draw(static_cast<std::size_t>(spec.count));
-    sample.x = random_places(scene, k, sample.radius);
+    sample.x = random_places(scene, k, sample.radius, before);
   } else if (spec.region) {
     sample.x = sites_in_region(scene, spec, fmt::format("sample[{}].region", k));
     sample.radius = draw(sample.x.size());
@@ -200,7 +208,7 @@ Sample build_sample(const io::Scene& scene, std::optional<Sample> state) {
   std::vector<Sample> parts;
   for (std::size_t k = 0; k < scene.samples.size(); ++k) {
     const bool is_state = scene.samples[k].kind == io::SampleSpec::Kind::state;
-    parts.push_back(!is_state ? make_part(scene, k) : state ? std::move(*state) : read_state(scene).sample);
+    parts.push_back(!is_state ? make_part(scene, k, parts) : state ? std::move(*state) : read_state(scene).sample);
     put_materials(scene, parts.back(), k);
   }
   Sample sample = parts.size() == 1 ? std::move(parts.front()) : join_samples(scene, std::move(parts));

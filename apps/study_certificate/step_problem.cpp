@@ -42,19 +42,6 @@ bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, 
   return true;
 }
 
-void refuse_what_is_unknown(const StepInput& input) {
-  if (!input.setup.clumps.empty()) throw std::invalid_argument("the audit knows spheres only, no clumps");
-  for (const Wall& wall : input.walls)
-    if (wall.surface() != nullptr)
-      throw std::invalid_argument("the audit knows plane walls only; '" + wall.name + "' is none");
-  for (const Wall& wall : input.walls)
-    if (!wall.motion.empty() || wall.absent)
-      throw std::invalid_argument("the audit knows no walls that move by themselves or are absent: '" +
-                                  wall.name + "'");
-  if (input.stage.laws.attract() || input.stage.laws.largest(&PairLaw::rolling_resistance) > 0)
-    throw std::invalid_argument("the audit knows neither cohesion nor rolling resistance");
-}
-
 /// What rebuild_step works with.
 class Builder {
  public:
@@ -215,8 +202,22 @@ bool StepProblem::smooth() const {
   return std::ranges::all_of(contacts, [](const StepContact& contact) { return contact.friction == 0; });
 }
 
+void demand_audited(const Setup& setup) {
+  const auto refuse = [](const std::string& what) { throw std::invalid_argument("the audit knows " + what); };
+  if (!setup.clumps.empty()) refuse("spheres only, no clumps");
+  if (!setup.inserts.empty()) refuse("no grains that are inserted");
+  for (const Wall& wall : setup.walls) {
+    if (wall.surface() != nullptr) refuse("plane walls only; '" + wall.name + "' is none");
+    if (!wall.motion.empty() || !wall.from_stage.empty() || !wall.until_stage.empty())
+      refuse("no walls that move by themselves, come or go: '" + wall.name + "'");
+  }
+  for (const Stage& stage : setup.stages)
+    if (stage.laws.attract() || stage.laws.largest(&PairLaw::rolling_resistance) > 0)
+      refuse("neither cohesion nor rolling resistance");
+}
+
 StepProblem rebuild_step(const StepInput& input) {
-  refuse_what_is_unknown(input);
+  demand_audited(input.setup);
   return Builder(input).build();
 }
 

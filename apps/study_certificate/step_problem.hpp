@@ -69,8 +69,11 @@ struct StepInput {
   double time = 0;                ///< since the stage began [s]
 };
 
-/// Throws std::invalid_argument for what it has no formulas for: clumps, walls other than planes, cohesion,
-/// rolling resistance.
+/// Throws std::invalid_argument for what there are no formulas for: clumps, walls other than planes or that
+/// move by themselves, come or go, grains that are inserted, cohesion, rolling resistance.
+void demand_audited(const Setup& setup);
+
+/// Throws what demand_audited throws.
 StepProblem rebuild_step(const StepInput& input);
 
 /// Adds to `motion` what an impulse r [N s] of the contact does.

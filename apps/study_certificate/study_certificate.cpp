@@ -19,6 +19,7 @@
 #include "apps/study_certificate/calibration.hpp"
 #include "apps/study_certificate/certificate_report.hpp"
 #include "apps/study_certificate/scene_maker.hpp"
+#include "apps/study_certificate/step_problem.hpp"
 #include "io/files/output_directory.hpp"
 
 namespace talus {
@@ -142,6 +143,11 @@ std::vector<io::Scene> given_scenes(const StudyCertificateOptions& options) {
       all.push_back(fmt::format("solver.tolerance={}", tolerance));
       all.push_back(fmt::format("solver.balance_tolerance={}", tolerance));
       scenes.push_back(io::load_scene(file.string(), all));
+    }
+    try {
+      demand_audited(scenes.back().setup);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: {}", file.string(), error.what()));
     }
   }
   return scenes;

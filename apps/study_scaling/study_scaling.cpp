@@ -97,6 +97,35 @@ struct PreparedStudy {
   std::optional<io::DirectoryLock> lock;
 };
 
+/// Throws std::invalid_argument where the scene surely ends before step `last`.
+void demand_steps(const io::Scene& scene, std::int64_t last) {
+  std::int64_t most = 0;
+  for (const Stage& stage : scene.setup.stages) {
+    if (!stage.end.steps) return;
+    most += *stage.end.steps;
+  }
+  if (most < last)
+    throw std::invalid_argument(fmt::format(
+        "the scene ends after {} steps: ask for earlier ones than {} with --steps", most, last));
+}
+
+/// The part of the scene's sample that weak scaling on n cores has.
+double weak_part(const std::vector<int>& all, int n) {
+  return static_cast<double>(n) / all.back();
+}
+
+/// Throws std::invalid_argument where the smallest sample cannot be made.
+void demand_weak_sample(const StudyScalingOptions& options, const std::vector<int>& all) {
+  try {
+    scaled_sample(options.scene, options.overrides, options.stage, weak_part(all, all.front()));
+  } catch (const std::exception& error) {
+    throw std::invalid_argument(
+        fmt::format("the sample of weak scaling for {} of {} cores cannot be made: {}; ask for others with "
+                    "--weak, or for none with --no-weak",
+                    all.front(), all.back(), error.what()));
+  }
+}
+
 /// Fills in `study`, which begins empty. Throws std::exception for whatever is wrong with the options and
 /// their files.
 void prepare(const StudyScalingOptions& options, PreparedStudy& study) {
@@ -111,7 +140,12 @@ void prepare(const StudyScalingOptions& options, PreparedStudy& study) {
   study.sample = scaling_sample(options.scene, options.overrides, options.from, options.stage);
   const ScalingSample& sample = study.sample;
   if (const auto most = static_cast<std::size_t>(study.plan.strong.back()); most > sample.grains.size())
-    throw std::invalid_argument(fmt::format("{} subdomains for {} grains", most, sample.grains.size()));
+    throw std::invalid_argument(
+        fmt::format("{} subdomains for {} grains: take fewer with --subdomains, and on machines of more cores "
+                    "--cores 1",
+                    most, sample.grains.size()));
+  demand_steps(sample.scene, study.plan.last);
+  if (study.no_weak.empty() && !study.plan.weak.empty()) demand_weak_sample(options, study.plan.weak);
   const std::string directory = options.out.empty() ? "out/scaling-" + sample.scene.name : options.out;
   if (options.reuse) study.recordings = read_recordings(fs::path(directory) / "traces" / "times.csv");
   write_strong(sample, directory, options.reuse, [&] {
@@ -137,8 +171,8 @@ void say_subject(const StudyScalingOptions& options, const PreparedStudy& study)
 void run_weak(const StudyScalingOptions& options, const PreparedStudy& prepared, ScalingStudy& study) {
   const std::vector<int>& all = prepared.plan.weak;
   for (const int n : all) {
-    const double part = static_cast<double>(n) / all.back();
-    const ScalingSample sample = scaled_sample(options.scene, options.overrides, options.stage, part);
+    const ScalingSample sample =
+        scaled_sample(options.scene, options.overrides, options.stage, weak_part(all, n));
     const std::string stem = fmt::format("weak-{}", n);
     if (!holds(prepared.directory, sample, stem)) study.forget(stem);
     write_scaling_sample(sample, prepared.directory, stem);

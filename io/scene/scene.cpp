@@ -340,11 +340,11 @@ class SceneReader {
         fail_at(*node, fmt::format("{}.{}", end_path, key),
                 "needs a periodic cell that flows in this stage: [cell], and rates or a stress");
     const bool ends_else = end.steps || end.time || end.equilibrium || end.by_memory();
-    if (end.shear_strain && !flows && !ends_else && !end.strain)
+    if (end.shear_strain && !(flows && stage.shears()) && !ends_else && !end.strain)
       fail_at(*node, end_path + ".shear_strain",
-              "the cell has no rates and no stress in this stage: it would never end");
+              "the cell has no stress in this stage, and no rates that change its shape: it would never end");
     const bool of_cell = scene_.setup.domain.edges()[end.strain_axis] > 0;
-    if (end.strain && !ends_else && !(end.shear_strain && flows) &&
+    if (end.strain && !ends_else && !(end.shear_strain && stage.shears()) &&
         (of_cell ? !stage.strains(end.strain_axis) : !flows && stands_still(scene_.setup.walls, in_force)))
       fail_at(*node, end_path + ".strain",
               of_cell ? "the cell is not strained along that axis in this stage: it would never end"

@@ -160,11 +160,11 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   if (answer.jammed) return;
   if (has_friction(problem)) {
     left += thresholds.coulomb_share * budget;
-    take(coulomb_correction(problem, goal.enough, thresholds.correction, thresholds.coulomb, left));
+    take(coulomb_correction(problem, goal, thresholds.correction, thresholds.coulomb, left));
   }
   left += thresholds.proximal_share * budget;
   if (!answer.solved)
-    take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
+    take(proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;
   // A cell that follows a stress couples all contacts: the matrix would be full.
   if (!answer.solved && !problem.has_cell()) solve_by_matrix(problem, goal.enough, left, thresholds, answer);

@@ -56,13 +56,6 @@ struct ClusterAnswer {
   bool jammed = false;        ///< there is none: none_admissible
 };
 
-/// What is asked of an answer.
-struct ClusterGoal {
-  double enough = 0;    ///< momentum that need not be told apart [N s]
-  double relative = 0;  ///< the same over the cluster's scale
-  int sweeps = 0;       ///< that the step has had: its budget (ClusterThresholds) grows with them
-};
-
 /// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, and there may be an
 /// answer (admissible.hpp), proximal steps, with friction first those of coulomb_newton.hpp, then
 /// proximal_newton.hpp; and where these do not either, with what is left of the budget the solvers that keep

@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "kernels/bodies/larger.hpp"
 #include "kernels/clusters/block_elimination.hpp"
 #include "kernels/clusters/freedoms.hpp"
 #include "kernels/global/natural_map.hpp"
@@ -36,6 +37,12 @@ std::ptrdiff_t loops_of(const BodyProblem& problem) {
   const std::size_t bodies = problem.bodies.size() - (problem.has_cell() ? 1 : 0);
   return pairs_end - pairs.begin() - static_cast<std::ptrdiff_t>(bodies) + 1;
 }
+
+/// What steps have still to change.
+struct LinearRest {
+  double momentum = std::numeric_limits<double>::infinity();  ///< of the motion [N s]
+  double impulse = std::numeric_limits<double>::infinity();   ///< of a contact, over the largest of all
+};
 
 /// The problem of a step, around impulses t.
 class CoulombStep {
@@ -96,13 +103,13 @@ class CoulombStep {
     way -= system.solve(f + product(slope, way));
     return way.allFinite();
   }
-  /// What steps behind the one from impulses t to d add to the motion in all, if contacts stay as they are:
-  /// the R with H^T R = -(v + H^T d) at those that carry. That step has changed their impulses by what this
-  /// asks for over rho, and has left a `residual`: (M + K) R = H (r(d) - t) - residual, of which K = H P' rho
-  /// H^T need not have an inverse, and is made so firm that M hardly counts. Momentum [N s], infinite where
-  /// there is no solution.
-  double linear_rest(const Vector& d, double firmness, double firm_enough, const std::vector<Vec3>& t,
-                     double& work) const {
+  /// What steps behind the one from impulses t to d change in all, if contacts stay as they are. To the
+  /// motion: the R with H^T R = -(v + H^T d) at those that carry. That step has changed their impulses by
+  /// what this asks for over rho, and has left a `residual`: (M + K) R = H (r(d) - t) - residual, of which K
+  /// = H P' rho H^T need not have an inverse, and is made so firm that M hardly counts. To the impulses: what
+  /// they would take from there. Infinite where there is no solution.
+  LinearRest linear_rest(const Vector& d, double firmness, double firm_enough, const std::vector<Vec3>& t,
+                         double& work) const {
     const double times = firm_enough / firmness;
     std::vector<Mat3> slope = slopes(d, firmness, t);
     for (Mat3& s : slope) s *= times;
@@ -112,7 +119,14 @@ class CoulombStep {
       add_force(k, times * (impulse(k, d, firmness, t) - t[k]), f);
     Vector rest = system.solve(f);
     rest -= system.solve(product(slope, rest) - f);
-    return rest.allFinite() ? momentum_of(problem_, twists(rest)) : std::numeric_limits<double>::infinity();
+    if (!rest.allFinite()) return {};
+    double most = 0, largest = 0;
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const Vec3 r = impulse(k, d, firmness, t);
+      most = larger(most, (times * (r - t[k]) - slope[k] * change(k, rest)).norm());
+      largest = larger(largest, r.norm());
+    }
+    return {momentum_of(problem_, twists(rest)), most > 0 ? most / largest : 0};
   }
 
  private:
@@ -238,15 +252,14 @@ class CoulombSteps {
     return now;
   }
 
-  std::optional<double> to_come(const Correction& now, double enough, double& work) const {
+  std::optional<double> to_come(const Correction& now, const ClusterGoal& goal, double& work) const {
     const CoulombThresholds::Known& known = thresholds_.known;
     if (loops_ <= known.loops) return {};
-    const double most = known.to_come * enough;
-    if (now.open > known.left * enough || now.left > known.left * enough || known.steps * now.moved > most)
-      return {};
-    const double linear = step_.linear_rest(d_, firmness_, known.firmness, began_, work);
-    const double rest = std::max(known.steps * now.moved, linear);
-    if (!(rest <= most)) return {};
+    const double left = known.left * goal.enough, most = known.to_come * goal.enough;
+    if (now.open > left || now.left > left || known.steps * now.moved > most) return {};
+    const LinearRest linear = step_.linear_rest(d_, firmness_, known.firmness, began_, work);
+    const double rest = std::max(known.steps * now.moved, linear.momentum);
+    if (!(rest <= most && linear.impulse <= known.forces * goal.relative)) return {};
     return rest;
   }
   bool firmer(bool small) const { return slow_ || small; }
@@ -286,11 +299,11 @@ class CoulombSteps {
 
 }  // namespace
 
-Correction coulomb_correction(const BodyProblem& problem, double enough,
+Correction coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
                               const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
                               double& work) {
   CoulombSteps steps(problem, coulomb);
-  return search_by_steps(problem, enough, thresholds, coulomb.search, steps, work);
+  return search_by_steps(problem, goal, thresholds, coulomb.search, steps, work);
 }
 
 }  // namespace talus

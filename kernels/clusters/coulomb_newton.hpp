@@ -29,11 +29,12 @@ struct CoulombThresholds {
   /// and what is still to come is within the part `to_come` of it, in (0, 1). That is so many `steps` like
   /// the last, > 1, as contacts may change; or if that is more all that would follow if they did not, as a
   /// firmness >> 1 shows. (In a heap of 190 grains at rest 300 further steps changed at most 1.4 times as
-  /// much.)
+  /// much.) And if they did not no impulse would creep on by more than so many times, `forces` > 0, the
+  /// error that is asked for, relative to the largest.
   struct Known {
     std::int32_t loops = SmallClusters{}.loops;
     double left = 0.02, to_come = 0.5;
-    double steps = 20, firmness = 1e9;
+    double steps = 20, firmness = 1e9, forces = 2;
   };
   Known known = {};
 };
@@ -49,7 +50,7 @@ struct CoulombThresholds {
 /// holds. Newton's method solves it, by matrices M + H P' rho H^T, which are not symmetric. Unlike the convex
 /// problem of proximal_newton.hpp it need not have one solution, and a line search may come to a stop: then
 /// the step is taken back and made softer.
-Correction coulomb_correction(const BodyProblem& problem, double enough,
+Correction coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
                               const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
                               double& work);
 

@@ -17,8 +17,11 @@ namespace {
 /// Convex steps (search_by_steps), whose projections are the next centre.
 class ProximalSteps {
  public:
-  ProximalSteps(const BodyProblem& problem, const ProximalThresholds& thresholds)
-      : problem_(problem), thresholds_(thresholds), step_(problem, thresholds.search.first_firmness) {
+  ProximalSteps(const BodyProblem& problem, double still, const ProximalThresholds& thresholds)
+      : problem_(problem),
+        still_(still),
+        thresholds_(thresholds),
+        step_(problem, thresholds.search.first_firmness) {
     for (const BodyUnknown& body : problem.bodies)
       fastest_ = larger(fastest_, larger(body.free.u.norm(), body.free.w.norm()));
   }
@@ -66,7 +69,7 @@ class ProximalSteps {
   }
 
   /// Without friction: what pushes the forces on is rounding of the gaps.
-  bool at_rest() const { return closing_ <= thresholds_.rounding * larger(fastest_, asked_); }
+  bool at_rest() const { return closing_ <= larger(still_, thresholds_.rounding * larger(fastest_, asked_)); }
 
   /// Without friction: along the last change of the impulses to where the dual objective 1/2 |V(r)|_M^2 +
   /// r.offset is least, until a contact opens, or one has changed by the largest. In directions that W hardly
@@ -132,6 +135,7 @@ class ProximalSteps {
   }
 
   const BodyProblem& problem_;
+  double still_;  ///< ClusterGoal::still [m/s]
   const ProximalThresholds& thresholds_;
   ProximalStep step_;
   std::vector<Vec3> before_;     ///< centres of the last step [N s]
@@ -148,11 +152,11 @@ class ProximalSteps {
 
 }  // namespace
 
-Correction proximal_correction(const BodyProblem& problem, double enough,
+Correction proximal_correction(const BodyProblem& problem, const ClusterGoal& goal,
                                const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
                                double& work) {
-  ProximalSteps steps(problem, proximal);
-  return search_by_steps(problem, enough, thresholds, proximal.search, steps, work);
+  ProximalSteps steps(problem, goal.still, proximal);
+  return search_by_steps(problem, goal, thresholds, proximal.search, steps, work);
 }
 
 }  // namespace talus

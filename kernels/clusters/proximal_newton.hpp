@@ -22,19 +22,19 @@ struct ProximalThresholds {
   int most_leaps = 40;
   double most_growth = 100;
   /// Normal velocities of contacts that carry, over the fastest velocity there is, in (0, 1): less of it is
-  /// rounding, and says nothing of who carries.
+  /// rounding, as is less than ClusterGoal::still, and says nothing of who carries.
   double rounding = 1e-12;
 };
 
 /// What would set all contacts right, as correction_of. `work`: multiplications after which no more
-/// factorisations begin, in; what is left of them, out. `enough`, the goal and `open` are the same; settled:
+/// factorisations begin, in; what is left of them, out. What is left and `open` are the same; settled:
 /// further steps would change next to nothing.
 ///
 /// The projections of a step (proximal_step.hpp) are the centres t of the next one, and its velocities make
 /// the next shift s = mu |v_t|, none without friction. For given s steps come as near as need be to an answer
 /// of that convex problem, one near the first t where redundant contacts leave several (Rockafellar 1976). s
 /// follows the velocities (Cadoux 2009); with friction it need not settle.
-Correction proximal_correction(const BodyProblem& problem, double enough,
+Correction proximal_correction(const BodyProblem& problem, const ClusterGoal& goal,
                                const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
                                double& work);
 

@@ -107,7 +107,8 @@ class Answers {
       scales_[c] =
           std::max({scale_of(rows[c], thresholds_), thresholds_.interest * everywhere * share, still});
       noise_[c] = std::max(thresholds_.rounding * most_momentum(rows[c][mass], rows[c][incoming]), still);
-      answers_[c] = solve_cluster(clusters_[c].problem, {goal.enough * scales_[c], goal.enough, goal.sweeps},
+      answers_[c] = solve_cluster(clusters_[c].problem,
+                                  {goal.enough * scales_[c], goal.enough, goal.sweeps, goal.still},
                                   thresholds_.cluster);
     });
   }

@@ -57,12 +57,13 @@ struct StepStart {
 ///
 /// and for problems with friction
 ///
-///   std::optional<double> to_come(const Correction&, double enough, double& work) const
+///   std::optional<double> to_come(const Correction&, const ClusterGoal&, double& work) const
 ///                                          what steps behind this one may still change, where that is little
 ///                                          enough to be an answer [N s]
 template <class Steps>
-Correction search_by_steps(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds,
-                           const SearchThresholds& search, Steps& steps, double& work) {
+Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
+                           const CorrectionThresholds& thresholds, const SearchThresholds& search,
+                           Steps& steps, double& work) {
   Correction best;
   best.impulse.assign(problem.contacts.size(), Vec3::Zero());
   best.motion.resize(problem.bodies.size());
@@ -73,7 +74,7 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
   int wary = 0;
   for (int k = 1; k <= search.most_steps && work > 0 && !best.settled; ++k) {
     const std::vector<Twist> before = steps.motion();
-    const double goal = goal_of(momentum_of(problem, before), enough, thresholds);
+    const double goal = goal_of(momentum_of(problem, before), asked.enough, thresholds);
     if (!steps.solve({firmness, goal, moved}, work)) {
       firmness /= search.growth;
       if (firmness < search.least_firmness) break;
@@ -92,9 +93,9 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
     bool known = friction || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
-    if constexpr (requires { steps.to_come(now, enough, work); })
+    if constexpr (requires { steps.to_come(now, asked, work); })
       if (!now.settled)
-        if (const std::optional<double> rest = steps.to_come(now, enough, work)) {
+        if (const std::optional<double> rest = steps.to_come(now, asked, work)) {
           now.missed = *rest;
           now.settled = true;
         }

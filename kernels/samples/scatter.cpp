@@ -87,14 +87,17 @@ Vec3 place_of(const ScatterBox& box, double radius, std::size_t k, std::uint32_t
 
 }  // namespace
 
-std::vector<Vec3> scatter(std::span<const double> radii, const ScatterBox& box) {
+std::vector<Vec3> scatter(std::span<const double> radii, const ScatterBox& box, const StandingGrains& stand) {
   std::vector<Vec3> centres(radii.size());
   if (radii.empty()) return centres;
   constexpr std::uint32_t most_tries = 10000;
   std::vector<std::size_t> order(radii.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::size_t k) { return radii[k]; });
-  PlacedGrains placed(box, radii[order[0]]);
+  double largest = radii[order[0]];
+  for (const double radius : stand.radius) largest = std::max(largest, radius);
+  PlacedGrains placed(box, largest);
+  for (std::size_t k = 0; k < stand.x.size(); ++k) placed.add(box.domain.wrap(stand.x[k]), stand.radius[k]);
   std::size_t done = 0;
   for (const std::size_t k : order) {
     std::uint32_t attempt = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "kernels/clusters/cluster_work.hpp"
@@ -24,13 +25,23 @@ namespace {
 class StepLink final : public PartLink {
  public:
   StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew,
-           trace::Meetings& rounds)
-      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew), rounds_(rounds) {}
+           trace::Meetings& rounds, trace::SharedWork& shared)
+      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew), rounds_(rounds), shared_(shared) {}
 
   bool several() const override { return state_.decomposition.several(); }
 
   void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
-    crew_.share(parts, work);
+    if (ranks_.trace() == nullptr) return crew_.share(parts, work);
+    std::vector<double> seconds(parts);
+    const double began = graph::seconds_now();
+    crew_.share(parts, [&](std::size_t part) {
+      const double from = graph::seconds_now();
+      work(part);
+      seconds[part] = graph::seconds_now() - from;
+    });
+    shared_.elapsed += graph::seconds_now() - began;
+    shared_.all += std::accumulate(seconds.begin(), seconds.end(), 0.0);
+    shared_.longest += seconds.empty() ? 0 : *std::ranges::max_element(seconds);
   }
 
   void sum_copies(PartField& field) const override {
@@ -66,7 +77,7 @@ class StepLink final : public PartLink {
 
  private:
   static void count(std::uint16_t& calls) {
-    if (calls < std::numeric_limits<std::uint16_t>::max()) ++calls;
+    if (calls < trace::Meetings::most) ++calls;
   }
 
   const StepState& state_;
@@ -74,6 +85,7 @@ class StepLink final : public PartLink {
   const graph::Communicator& ranks_;
   graph::Crew& crew_;
   trace::Meetings& rounds_;
+  trace::SharedWork& shared_;
 };
 
 /// Kinetic energy of the velocities that impulses make, twice [J].
@@ -155,20 +167,25 @@ GlobalSolver::GlobalSolver(StepState& state, const StepParameters& parameters,
       parameters_(parameters),
       decomposition_(decomposition),
       ranks_(ranks),
-      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_, rounds_)) {}
+      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_, rounds_, shared_)) {}
 
 class GlobalSolver::Whole {
  public:
   explicit Whole(const GlobalSolver& solver)
       : solver_(solver), span_(solver.ranks_.trace(), kind_of(TaskKind::whole), 0, trace::Span::in_check) {
     solver.rounds_ = {};
+    solver.shared_ = {};
   }
-  ~Whole() { span_.set_node(solver_.rounds_.packed()); }
+  ~Whole() {
+    solver_.rounds_.threads = solver_.shared_.threads(graph::seconds_now() - began_);
+    span_.set_node(solver_.rounds_.packed());
+  }
   Whole(const Whole&) = delete;
   Whole& operator=(const Whole&) = delete;
 
  private:
   const GlobalSolver& solver_;
+  double began_ = graph::seconds_now();
   trace::Span span_;
 };
 

@@ -12,6 +12,7 @@
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/worst_errors.hpp"
+#include "runtime/trace/recorder.hpp"
 #include "runtime/trace/trace.hpp"
 
 namespace talus {
@@ -105,7 +106,8 @@ class GlobalSolver {
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
   graph::Crew crew_;
-  mutable trace::Meetings rounds_;  ///< since the last span began
+  mutable trace::Meetings rounds_;    ///< since the last span began
+  mutable trace::SharedWork shared_;  ///< likewise
   std::unique_ptr<PartLink> link_;
   std::vector<std::vector<char>> in_small_;  ///< per part and unknown
   BodyGroups groups_;                        ///< the large clusters

@@ -101,6 +101,11 @@ struct Stage {
     return strain_rates[axis] != 0 || stress.to[static_cast<std::size_t>(axis)].has_value();
   }
   bool flows() const { return !strain_rates.isZero(0) || !shear_rates.isZero(0) || stress.any(); }
+  /// The cell may change its shape, not its size alone.
+  bool shears() const {
+    const bool alike = (strain_rates.array() == strain_rates[0]).all();
+    return !alike || !shear_rates.isZero(0) || stress.any();
+  }
   PairTable laws;                                       ///< of the setup's materials
   std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
   StageEnd end;

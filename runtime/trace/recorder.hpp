@@ -17,6 +17,7 @@
 
 #include <omp.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -163,6 +164,19 @@ class Span {
   Where where_;
   std::uint32_t node_;
   std::int64_t begin_ = 0;
+};
+
+/// Work that threads have shared, piece by piece, in a span that a trace records.
+struct SharedWork {
+  double elapsed = 0;  ///< [s] from its beginning to its end
+  double all = 0;      ///< [s] of all pieces, each as long as its thread took
+  double longest = 0;  ///< [s] of the longest one
+
+  /// As many as a span of so many seconds can keep busy, whose rest is one thread's: >= 1.
+  double threads(double span) const {
+    const double rest = std::max(span - elapsed, 0.0), least = rest + longest;
+    return least > 0 ? std::max(1.0, (rest + all) / least) : 1;
+  }
 };
 
 }  // namespace talus::trace

@@ -316,19 +316,25 @@ class Player {
   }
 
   /// Adds what all ranks did together within the check of recorded epoch e. As long as the rank with the
-  /// largest share needs; threads that wait help, each with a subdomain.
+  /// largest share needs, or what one thread has to do alone (Meetings); threads that wait help, each with a
+  /// subdomain.
   void do_together(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
     for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
       const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
       const double scale = machine_.contacts / stage_.speed_of(record.kind());
       double most = 0;
+      std::vector<double> works(index.ranks.size(), 0.0);
+      for (std::size_t s = 0; s < works.size(); ++s) {
+        if (k >= index.ranks[s].whole[e].size()) continue;
+        const Place place = index.ranks[s].whole[e][k];
+        const Meetings of_rank = Meetings::of(stage_.timeline.record(place).node);
+        works[s] = scale * stage_.timeline.self(place) * of_rank.busy(helpers(source_, s, trace_.threads));
+        if (of_rank.threads > 0) most = std::max(most, works[s] / of_rank.threads);
+      }
       for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) {
         double work = 0;
-        for (std::size_t s = 0; s < index.ranks.size(); ++s)
-          if (k < index.ranks[s].whole[e].size())
-            work += share(r, s) * stage_.timeline.self(index.ranks[s].whole[e][k]) *
-                    helpers(source_, s, trace_.threads);
-        most = std::max(most, work * scale / helpers(rank_of_, r, machine_.threads));
+        for (std::size_t s = 0; s < works.size(); ++s) work += share(r, s) * works[s];
+        most = std::max(most, work / helpers(rank_of_, r, machine_.threads));
       }
       epoch.spans.push_back({epoch.whole, epoch.whole + most, record.node, record.kind()});
       epoch.whole += most;

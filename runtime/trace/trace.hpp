@@ -7,6 +7,8 @@
 /// finished 7.3 us later. It could begin because the nodes that conflict with node 17 and have lower colours
 /// had ended epoch 4, those with higher colours epoch 3.
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -65,13 +67,23 @@ inline bool is_communication(Kind kind) {
 }
 
 /// How often all ranks communicate in a task that they do together: gathers of numbers on all ranks, and
-/// exchanges of copies between all subdomains. Within a check it is Record::node of its span.
+/// exchanges of copies between all subdomains, both at most `most`; and how many threads it can keep busy, as
+/// one has to do what belongs together. Within a check it is Record::node of its span.
 struct Meetings {
+  static constexpr std::uint16_t most = 4095;
   std::uint16_t gathers = 0, exchanges = 0;
-  std::uint32_t packed() const { return std::uint32_t{gathers} << 16 | exchanges; }
-  static Meetings of(std::uint32_t packed) {
-    return {static_cast<std::uint16_t>(packed >> 16), static_cast<std::uint16_t>(packed)};
+  double threads = 0;  ///< >= 1, kept in quarters; 0: as many as there are, which those from 64 on become
+  std::uint32_t packed() const {
+    const double quarters = std::round(4 * threads);
+    const std::uint32_t kept = quarters < 256 ? static_cast<std::uint32_t>(quarters) : 0;
+    return std::uint32_t{gathers} << 20 | std::uint32_t{exchanges} << 8 | kept;
   }
+  static Meetings of(std::uint32_t packed) {
+    return {static_cast<std::uint16_t>(packed >> 20), static_cast<std::uint16_t>(packed >> 8 & most),
+            0.25 * (packed & 0xffU)};
+  }
+  /// Of `there` threads, >= 1, those that it keeps busy.
+  double busy(double there) const { return threads > 0 ? std::min(there, threads) : there; }
 };
 
 /// One task, or one span within a task (then it lies within the task's time, on the same track).

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <string>
 
+#include "io/results/results.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::several_samples_test {
 namespace {
@@ -55,6 +56,38 @@ class SeveralSamples : public CommandTest {
     return test::run(folder_.path(), "run scene.toml " + more);
   }
 };
+
+/// A mixture of two materials, each drawn at random: the second where the first has left room.
+TEST_F(SeveralSamples, DrawnAtRandomShareACell) {
+  const std::string mixture = R"(time_step = 1e-5
+[cell]
+lengths = [0.02, 0.02, 0.02]
+[[material]]
+name = "glass"
+density = 2500
+[[material]]
+name = "steel"
+density = 7800
+[[sample]]
+kind = "random"
+count = 300
+radius = 0.0008
+[[sample]]
+kind = "random"
+count = 60
+radius = 0.0012
+material = "steel"
+[[stage]]
+end = { steps = 1 }
+)";
+  const Outcome outcome = run(mixture);
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  const Frame frame = io::read_frame(at("out/results.h5"), 0);
+  ASSERT_EQ(frame.x.size(), 360U);
+  for (std::size_t a = 0; a < frame.x.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      EXPECT_GE(frame.domain.separation(frame.x[a], frame.x[b]).norm(), frame.radius[a] + frame.radius[b]);
+}
 
 /// Nothing touches the ball: it falls as a body does, and feels no force.
 TEST_F(SeveralSamples, ABodyWithANameLeavesItsPath) {

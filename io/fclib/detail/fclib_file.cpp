@@ -11,6 +11,7 @@
 
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/error.hpp"
+#include "io/files/output_directory.hpp"
 
 namespace talus::io::detail {
 namespace {
@@ -216,7 +217,7 @@ void write_matrix(hid_t place, const std::string& path, const DelassusProblem& p
 }
 
 Draft::Draft(const std::filesystem::path& out)
-    : path_(std::filesystem::path(out).concat(fmt::format(".{}.part", ::getpid()))) {}
+    : path_(std::filesystem::path(out).concat(fmt::format(".{}{}", ::getpid(), unfinished_ending))) {}
 
 Draft::~Draft() {
   std::error_code ignored;

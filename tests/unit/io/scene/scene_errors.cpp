@@ -163,6 +163,15 @@ TEST(SceneErrors, StageWhoseEndNothingBringsAboutIsRefused) {
   EXPECT_NO_THROW(parse_scene(
       replaced(replaced(still, "steps = 5", "shear_strain = 0.1"), "#stage", "shear_rates = [0, 1, 0]"),
       file));
+  // Alike along all axes: the size changes, not the shape.
+  for (const auto& [rates, ends] : {std::pair{"[-1, -1, -1]", false}, {"[-1, -1, -0.5]", true}}) {
+    const std::string pressed = replaced(replaced(still, "steps = 5", "shear_strain = 0.1"), "#stage",
+                                         fmt::format("strain_rates = {}", rates));
+    if (ends)
+      EXPECT_NO_THROW(parse_scene(pressed, file));
+    else
+      expect_refused(pressed, "end = ", "stage[0].end.shear_strain", "never end");
+  }
 }
 
 TEST(SceneErrors, BrokenTomlIsRefusedWithItsLine) {

@@ -15,15 +15,16 @@ struct Steps {
   const char* name;
   Correction (*corrected)(const BodyProblem& problem);
 };
-const Steps both[] = {{"Coulomb's law",
-                       [](const BodyProblem& problem) {
-                         double work = 1e9;
-                         return coulomb_correction(problem, enough, {}, {}, work);
-                       }},
-                      {"convex", [](const BodyProblem& problem) {
-                         double work = 1e9;
-                         return proximal_correction(problem, enough, {}, {}, work);
-                       }}};
+const Steps both[] = {
+    {"Coulomb's law",
+     [](const BodyProblem& problem) {
+       double work = 1e9;
+       return coulomb_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work);
+     }},
+    {"convex", [](const BodyProblem& problem) {
+       double work = 1e9;
+       return proximal_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work);
+     }}};
 
 TEST(BothSteps, AGrainSlidesOrSticksAsCoulombSays) {
   constexpr double mu = 0.3, down = 0.1;

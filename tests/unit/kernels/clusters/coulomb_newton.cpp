@@ -16,7 +16,7 @@ using namespace cluster_makers;
 
 Correction corrected(const BodyProblem& problem) {
   double work = 1e9;
-  return coulomb_correction(problem, enough, {}, {}, work);
+  return coulomb_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work);
 }
 
 /// A grain jammed in a V, a hair's breadth above both walls, which has to slide down into it: its contacts
@@ -151,7 +151,8 @@ TEST(CoulombSteps, SayWhatIsStillToCome) {
         const BodyProblem problem = block(edge, layers, top, carried);
         const double missing = (1 - carried) * (edge * edge * layers + top) * fall;
         double work = 1e9;
-        const Correction answer = coulomb_correction(problem, precise * missing, {}, {}, work);
+        const Correction answer =
+            coulomb_correction(problem, {.enough = precise * missing, .relative = 1}, {}, {}, work);
         ASSERT_TRUE(answer.settled) << top << ' ' << carried << ' ' << precise;
         if (answer.missed > 0.01 * precise * missing) ++early;
         double wrong = 0;
@@ -170,11 +171,11 @@ TEST(CoulombSteps, SayWhatIsStillToCome) {
 TEST(CoulombSteps, KeepToTheirWorkAndSaySo) {
   const BodyProblem problem = wedge(0.3, 0.1);
   double work = 1;
-  EXPECT_FALSE(coulomb_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_FALSE(coulomb_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work).settled);
   EXPECT_LE(work, 0);
   EXPECT_GT(work, -1e5) << "one factorisation of one grain";
   work = 1e9;
-  EXPECT_TRUE(coulomb_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_TRUE(coulomb_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work).settled);
   EXPECT_LT(work, 1e9);
 }
 

@@ -15,7 +15,7 @@ using namespace cluster_makers;
 
 Correction corrected(const BodyProblem& problem) {
   double work = 1e9;
-  return proximal_correction(problem, enough, {}, {}, work);
+  return proximal_correction(problem, {.enough = enough}, {}, {}, work);
 }
 
 TEST(ProximalSteps, FindTheForcesInAWedgeHoweverSharpItIs) {
@@ -47,6 +47,24 @@ TEST(ProximalSteps, LeaveRedundantContactsTheSharesThatTheyHave) {
   }
 }
 
+/// The same where positions are far from the origin, so that rounding makes gaps differ by more.
+TEST(ProximalSteps, DoNotShareForcesByWhatRoundingMakesInGaps) {
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0);
+  for (int wall = 0; wall < 2; ++wall) add_contact(problem, grain, -1, Vec3::UnitZ(), 0, wall);
+  const double rounding = 1e-10 * fall;
+  problem.contacts[1].offset = rounding * Vec3::UnitZ();
+  problem.impulse = {0.4 * fall * Vec3::UnitZ(), 0.5 * fall * Vec3::UnitZ()};
+  for (const bool told : {false, true}) {
+    double work = 1e9;
+    const Correction answer =
+        proximal_correction(problem, {.enough = enough, .still = told ? 2 * rounding : 0}, {}, {}, work);
+    ASSERT_TRUE(answer.settled);
+    EXPECT_NEAR(impulse_of(problem, answer, 0).z(), (told ? 0.45 : 1) * fall, 1e-2 * fall) << told;
+    EXPECT_NEAR(impulse_of(problem, answer, 1).z(), (told ? 0.55 : 0) * fall, 1e-2 * fall) << told;
+  }
+}
+
 TEST(ProximalSteps, FindWhoCarriesALidWhereOnlyFirmStepsSeeIt) {
   // W resists a change of the shares by lean^2: a step of firmness 10^6 takes no more than a thousandth of
   // what is left where contacts lean least, moves the bodies by less than need be known, and is no answer.
@@ -55,7 +73,7 @@ TEST(ProximalSteps, FindWhoCarriesALidWhereOnlyFirmStepsSeeIt) {
     for (const double lean : {1e-1, 1e-2, 1e-3, 1e-4, 3e-5}) {
       const BodyProblem problem = under_a_lid(lean, apart * lean * lean, give / (lean * lean), 0);
       double work = 1e9;
-      const Correction answer = proximal_correction(problem, 2e-4, {}, {}, work);
+      const Correction answer = proximal_correction(problem, {.enough = 2e-4}, {}, {}, work);
       ASSERT_TRUE(answer.settled) << lean << ' ' << give;
       const double a = -impulse_of(problem, answer, 2).z(), b = -impulse_of(problem, answer, 3).z();
       EXPECT_NEAR(a - b, apart, 1e-2) << lean << ' ' << give;
@@ -72,21 +90,21 @@ TEST(ProximalSteps, DoNotTakeForcesWithoutBoundForAnAnswer) {
     problem.contacts.back().offset = -1e-6 * side * Vec3::UnitX();
   }
   double work = 1e9;
-  EXPECT_FALSE(proximal_correction(problem, 1e-2, {}, {}, work).settled);
+  EXPECT_FALSE(proximal_correction(problem, {.enough = 1e-2}, {}, {}, work).settled);
   // Where leaps may go on for ever the last step seems to change next to nothing.
   ProximalThresholds boundless;
   boundless.most_growth = 1e300;
-  EXPECT_TRUE(proximal_correction(problem, 1e-2, {}, boundless, work).settled);
+  EXPECT_TRUE(proximal_correction(problem, {.enough = 1e-2}, {}, boundless, work).settled);
 }
 
 TEST(ProximalSteps, KeepToTheirWorkAndSaySo) {
   const BodyProblem problem = wedge(1e-3, 0);
   double work = 1;
-  EXPECT_FALSE(proximal_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_FALSE(proximal_correction(problem, {.enough = enough}, {}, {}, work).settled);
   EXPECT_LE(work, 0);
   EXPECT_GT(work, -1e4) << "one factorisation of one grain";
   work = 1e9;
-  EXPECT_TRUE(proximal_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_TRUE(proximal_correction(problem, {.enough = enough}, {}, {}, work).settled);
   EXPECT_LT(work, 1e9);
   EXPECT_GT(work, 0.9e9);
 }

@@ -45,6 +45,30 @@ TEST(Scatter, PutsNoSphereIntoAnotherAcrossFacesOfAShearedCell) {
     EXPECT_NEAR(mean[axis], low[axis] + lengths[axis] / 2, 4 * lengths[axis] / std::sqrt(12 * 400.0));
 }
 
+TEST(Scatter, LeavesOutWhatStandsThereAlsoAcrossFaces) {
+  const Vec3 lengths(4, 5, 6), shears(1.8, 2.2, -1.4), low(-1, 3, 0);
+  const Domain domain = periodic_domain(lengths, low, shears);
+  Mat3 edges = Mat3(lengths.asDiagonal());
+  edges(0, 1) = shears[0];
+  edges(0, 2) = shears[1];
+  edges(1, 2) = shears[2];
+  // Larger and smaller ones than those to come, some in another image.
+  StandingGrains stand{{low, low + 0.5 * lengths, low + Vec3(9, 0.1, 14)}, {1.2, 0.05, 0.6}};
+  const std::vector<double> radii = three_sizes(300);
+  std::vector<Vec3> all = scatter(radii, {low, low + lengths, domain, 3, 1}, stand);
+  std::vector<double> sizes = radii;
+  for (std::size_t k = 0; k < stand.x.size(); ++k) {
+    all.push_back(domain.wrap(stand.x[k]));
+    sizes.push_back(stand.radius[k]);
+  }
+  EXPECT_GE(least_gap(all, sizes, edges), 0);
+  // In a box beside walls, too, where some stand behind its end.
+  stand = {{{2, 2, -0.3}, {2, 2, 9}}, {1, 3}};
+  std::vector<Vec3> boxed = scatter(three_sizes(100), {Vec3::Zero(), {4, 4, 5}, {}, 1, 0}, stand);
+  for (std::size_t k = 0; k < boxed.size(); ++k)
+    EXPECT_GE((boxed[k] - stand.x[0]).norm(), three_sizes(100)[k] + stand.radius[0]);
+}
+
 TEST(Scatter, StaysInsideAlongAxesThatDoNotRepeat) {
   const std::vector<double> radii = three_sizes(200);
   const std::vector<Vec3> x = scatter(radii, {Vec3::Zero(), {4, 4, 3}, periodic_domain({4, 4, 0}), 1, 0});

@@ -8,6 +8,7 @@
 
 #include "runtime/trace/analysis.hpp"
 #include "runtime/trace/network.hpp"
+#include "runtime/trace/recorder.hpp"
 #include "runtime/trace/replay.hpp"
 #include "runtime/trace/task_times.hpp"
 #include "tests/unit/runtime/trace/replay_helpers.hpp"
@@ -154,15 +155,15 @@ TEST(ReplayDecisions, ACheckThatSettlesIsReadAtOnce) {
 
 /// A task in the last check of two subdomains, which takes 10 ns more: two gathers and three exchanges. Of
 /// kind sweep all ranks and threads do it together, of kind task each rank its part.
-Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep) {
+Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep, double threads = 0) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.tracks[0].records;
   const auto check = std::ranges::find(records, kind_check, &Record::kind);
   check->duration = static_cast<float>(length + 10);
   check->node = check_settles;
   std::prev(records.end())->begin += length + 10;
-  records.insert(std::next(check),
-                 {check->begin + 10, static_cast<float>(length), Meetings{2, 3}.packed(), -1, pack(1, kind)});
+  records.insert(std::next(check), {check->begin + 10, static_cast<float>(length),
+                                    Meetings{2, 3, threads}.packed(), -1, pack(1, kind)});
   return trace;
 }
 
@@ -176,6 +177,38 @@ TEST(ReplayDecisions, WhatAllRanksDoInACheckIsShared) {
   const Replay played = replay(Timeline(trace), machine, true);
   EXPECT_NO_THROW(validate(played.trace));
   EXPECT_NEAR(analyse(played.trace).exposed, 2 * 6 * 30, 1e-3);
+}
+
+/// As long as what one thread has to do alone, on however many; recorded on one thread or on two.
+TEST(ReplayDecisions, WhatOneThreadHasToDoAloneIsNotShared) {
+  const double others = makespan(test::two_subdomains(1), bare(1, 2));
+  for (const auto& [threads, length] : {std::pair{1.0, 80.0}, {1.25, 64.0}, {2.0, 40.0}, {8.0, 40.0}}) {
+    const Trace trace = with_a_look(80, test::sweep, threads);
+    EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90) << threads;
+    EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 2)), others + 10 + length) << threads;
+    EXPECT_DOUBLE_EQ(makespan(trace, bare(2, 1)), 2 * 180 + 10 + length) << threads;
+    const Replay played = replay(Timeline(trace), bare(1, 2), true);
+    EXPECT_DOUBLE_EQ(makespan(played.trace, bare(1, 2)), played.makespan) << threads << ": played again";
+    EXPECT_NEAR(makespan(played.trace, bare(1, 1)), 4 * 180 + 90, 1) << threads << ": on one thread again";
+  }
+}
+
+TEST(Meetings, KeepWhatTheyCount) {
+  for (const double threads : {0.0, 1.0, 2.75, 63.75}) {
+    const Meetings kept = Meetings::of(Meetings{Meetings::most, 17, threads}.packed());
+    EXPECT_EQ(kept.gathers, Meetings::most);
+    EXPECT_EQ(kept.exchanges, 17);
+    EXPECT_EQ(kept.threads, threads);
+  }
+  EXPECT_EQ(Meetings::of(Meetings{1, 2, 200}.packed()).threads, 0) << "as many as there are";
+}
+
+TEST(SharedWork, KeepsAsManyThreadsBusyAsItsLongestPieceLeavesRoomFor) {
+  EXPECT_EQ((SharedWork{1, 1, 1}.threads(1)), 1) << "one piece";
+  EXPECT_EQ((SharedWork{1, 1, 0.25}.threads(1)), 4) << "four";
+  EXPECT_EQ((SharedWork{1, 1, 0.25}.threads(1.5)), 2) << "and half a second before them";
+  EXPECT_EQ((SharedWork{0.5, 1, 0.25}.threads(0.5)), 4) << "the same by two threads";
+  EXPECT_EQ(SharedWork{}.threads(0), 1);
 }
 
 // What one rank added up for both subdomains, two ranks add up for one each; a second thread of it waits.

@@ -5,7 +5,8 @@
 #include <algorithm>
 
 #include "tests/unit/io/results/output_helpers.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/unit/replaced.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::study_scaling_command_test {
 namespace {
@@ -236,9 +237,12 @@ TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
   refused("--cores 2", "mpirun is not to be found", "PATH=/nowhere");
   refused("--smpi no-such-talus", "no-such-talus");
   refused("--beside scene.toml", "name,cores,speedup");
+  refused("--steps 12:13", "the scene ends after 12 steps");
+  refused("--steps 2:3 --subdomains 1,4 --weak 4000", "--no-weak");
 }
 
 TEST_F(StudyScaling, SaysWhichStepsTheSceneDoesNotHave) {
+  write(at("scene.toml"), replaced(pressed_box, "end = { steps = 6 }", "end = { equilibrium = 1e9 }"));
   const Outcome outcome = run("study scaling scene.toml --out s --steps 50:60 --subdomains 2 --repeat 0");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_NE(outcome.messages.find("--steps"), std::string::npos) << outcome.messages;

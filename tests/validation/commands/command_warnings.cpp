@@ -8,7 +8,7 @@
 
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus {
 namespace {
@@ -46,6 +46,10 @@ TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
             std::string::npos);
   EXPECT_NE(of(replaced(column_scene, "[0, 0, -9.81]", "[9.81, 0, 0]")).find("no wall stands against it"),
             std::string::npos);
+  EXPECT_EQ(of(replaced(replaced(column_scene, "[0, 0, -9.81]", "[9.81, 0, 0]"), "density = 2600",
+                        "density = 2600\ncohesion = 1e-3")),
+            "")
+      << "it may hang";
 }
 
 TEST_F(Warnings, OfADensityInOtherUnits) {

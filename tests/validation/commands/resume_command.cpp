@@ -16,7 +16,7 @@
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::resume_command_test {
 namespace {
@@ -95,6 +95,7 @@ TEST_F(Resume, IsNotWaitedForByASecondSignal) {
   const Outcome told = run("status twice");
   EXPECT_NE(told.output.find("dead"), std::string::npos) << told.output;
   EXPECT_EQ(told.output.find("a second"), std::string::npos) << "it goes no further: " << told.output;
+  EXPECT_NE(told.output.find("when last heard of: step"), std::string::npos) << "it may have come further";
 }
 
 TEST_F(Resume, BeforeTheTimeIsUp) {

@@ -12,7 +12,7 @@
 #include <set>
 
 #include "tests/unit/io/results/output_helpers.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::study_command_test {
 namespace {

@@ -8,7 +8,7 @@
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::resume_refusals_test {
 namespace {

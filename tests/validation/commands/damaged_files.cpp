@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::damaged_files_test {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "io/results/results.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::command_output_test {
 namespace {
@@ -63,6 +63,8 @@ TEST_F(ThinnedOutput, OfARunIsDrawnAndToldWithoutReplacingWhatSomebodyElseWrote)
   for (const char* angle : {"--azimuth nan", "--azimuth inf", "--elevation nan"})
     EXPECT_EQ(run(std::string("view out -o view.png ") + angle).code, 2) << angle;
   EXPECT_FALSE(fs::exists(at("view.png")));
+  EXPECT_EQ(run("view out -o view.xyz").code, 2) << "a picture is no table of grains";
+  EXPECT_FALSE(fs::exists(at("view.xyz")));
 }
 
 class ColumnDictionary : public CommandTest {

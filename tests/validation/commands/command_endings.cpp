@@ -9,7 +9,7 @@
 
 #include "io/results/results.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::command_endings_test {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "tests/unit/io/results/output_helpers.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::command_streams_test {
 namespace {

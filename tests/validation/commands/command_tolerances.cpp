@@ -7,7 +7,7 @@
 #include <string>
 
 #include "tests/unit/io/results/output_helpers.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus {
 namespace {
@@ -61,6 +61,34 @@ TEST_F(Tolerances, NameTheContactAndTheBodyThatAStepMissed) {
   EXPECT_EQ(done.rows[3].at("converged"), "1");
   EXPECT_EQ(done.rows[3].at("worst_contact_body"), "-1");
   EXPECT_EQ(done.number(3, "worst_body_error"), 0);
+}
+
+/// A hundred grains, laid with friction, in the first step: within so few sweeps nobody knows who holds whom.
+TEST_F(Tolerances, WarnOfSmallClustersWithoutAnAnswer) {
+  write(at("scene.toml"), R"(time_step = 1e-3
+gravity = [0, 0, -9.81]
+box = true
+[material]
+density = 2600
+friction = 0.5
+[sample]
+kind = "deposition"
+count = 100
+base = [0.08, 0.08]
+radius_distribution = "uniform"
+radius_min = 0.006
+radius_max = 0.012
+[[stage]]
+end = { steps = 1 }
+)");
+  const std::string few = "run scene.toml --force --out results --set solver.max_iterations=5";
+  const Outcome outcome = run(few);
+  EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  EXPECT_EQ(read_table(at("results/steps.csv")).number(0, "balance"), 1);
+  EXPECT_NE(outcome.messages.find("its direct solve found no answer"), std::string::npos) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("solver.direct_bodies = 0"), std::string::npos) << outcome.messages;
+  const Outcome left = run(few + " --set solver.direct_bodies=0");
+  EXPECT_EQ(left.messages.find("its direct solve"), std::string::npos) << left.messages;
 }
 
 // A lid of a gram that 150 N push: two sweeps leave it falling at many times what any grain has.

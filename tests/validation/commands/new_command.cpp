@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::new_command_test {
 namespace {

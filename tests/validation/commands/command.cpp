@@ -9,7 +9,7 @@
 
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::command_test {
 namespace {

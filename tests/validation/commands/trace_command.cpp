@@ -10,7 +10,7 @@
 
 #include "io/trace/trace_file.hpp"
 #include "runtime/trace/timeline.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::test {
 namespace {

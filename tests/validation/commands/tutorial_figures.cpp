@@ -8,7 +8,7 @@
 #include <regex>
 
 #include "io/results/csv_reader.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::tutorial_test {
 namespace {

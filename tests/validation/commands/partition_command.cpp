@@ -6,7 +6,7 @@
 
 #include "partition/partitioners.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
-#include "tests/validation/command_helpers.hpp"
+#include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::partition_command_test {
 namespace {
