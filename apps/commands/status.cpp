@@ -95,8 +95,7 @@ void print(const ordered_json& status) {
   const bool lost = status["state"] == "dead" || status["state"] == "silent";
   text += fmt::format("{}step {}, {:.6g} s simulated, {} steps missed the tolerance\n",
                       lost ? "when last heard of: " : "", status["step"].get<std::int64_t>(),
-                      status["time"].get<double>(),
-                      status["missed_steps"].get<std::int64_t>());
+                      status["time"].get<double>(), status["missed_steps"].get<std::int64_t>());
   if (status.contains("steps_per_s"))
     text += fmt::format("{:.3g} steps a second", status["steps_per_s"].get<double>()) +
             (status.contains("stage_eta_s")

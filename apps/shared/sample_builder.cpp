@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <span>
+#include <stdexcept>
 #include <string>
 
 #include "apps/shared/patience.hpp"
@@ -98,7 +98,8 @@ std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std
     stand.radius.insert(stand.radius.end(), other.radius.begin(), other.radius.end());
   }
   try {
-    return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)}, stand);
+    return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)},
+                   stand);
   } catch (const std::invalid_argument& error) {
     throw io::SceneError(scene.source_file, 0, fmt::format("sample[{}].count", k), error.what());
   }
@@ -208,7 +209,9 @@ Sample build_sample(const io::Scene& scene, std::optional<Sample> state) {
   std::vector<Sample> parts;
   for (std::size_t k = 0; k < scene.samples.size(); ++k) {
     const bool is_state = scene.samples[k].kind == io::SampleSpec::Kind::state;
-    parts.push_back(!is_state ? make_part(scene, k, parts) : state ? std::move(*state) : read_state(scene).sample);
+    parts.push_back(!is_state ? make_part(scene, k, parts)
+                    : state   ? std::move(*state)
+                              : read_state(scene).sample);
     put_materials(scene, parts.back(), k);
   }
   Sample sample = parts.size() == 1 ? std::move(parts.front()) : join_samples(scene, std::move(parts));

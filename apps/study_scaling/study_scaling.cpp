@@ -105,8 +105,8 @@ void demand_steps(const io::Scene& scene, std::int64_t last) {
     most += *stage.end.steps;
   }
   if (most < last)
-    throw std::invalid_argument(fmt::format(
-        "the scene ends after {} steps: ask for earlier ones than {} with --steps", most, last));
+    throw std::invalid_argument(
+        fmt::format("the scene ends after {} steps: ask for earlier ones than {} with --steps", most, last));
 }
 
 /// The part of the scene's sample that weak scaling on n cores has.
@@ -140,10 +140,10 @@ void prepare(const StudyScalingOptions& options, PreparedStudy& study) {
   study.sample = scaling_sample(options.scene, options.overrides, options.from, options.stage);
   const ScalingSample& sample = study.sample;
   if (const auto most = static_cast<std::size_t>(study.plan.strong.back()); most > sample.grains.size())
-    throw std::invalid_argument(
-        fmt::format("{} subdomains for {} grains: take fewer with --subdomains, and on machines of more cores "
-                    "--cores 1",
-                    most, sample.grains.size()));
+    throw std::invalid_argument(fmt::format(
+        "{} subdomains for {} grains: take fewer with --subdomains, and on machines of more cores "
+        "--cores 1",
+        most, sample.grains.size()));
   demand_steps(sample.scene, study.plan.last);
   if (study.no_weak.empty() && !study.plan.weak.empty()) demand_weak_sample(options, study.plan.weak);
   const std::string directory = options.out.empty() ? "out/scaling-" + sample.scene.name : options.out;

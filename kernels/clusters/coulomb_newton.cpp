@@ -259,7 +259,8 @@ class CoulombSteps {
     if (now.open > left || now.left > left || known.steps * now.moved > most) return {};
     const LinearRest linear = step_.linear_rest(d_, firmness_, known.firmness, began_, work);
     const double rest = std::max(known.steps * now.moved, linear.momentum);
-    if (!(rest <= most && linear.impulse <= known.forces * goal.relative)) return {};
+    const bool creeps = goal.relative <= known.fine && !(linear.impulse <= known.forces * goal.relative);
+    if (creeps || !(rest <= most)) return {};
     return rest;
   }
   bool firmer(bool small) const { return slow_ || small; }

@@ -26,8 +26,8 @@ struct StandingGrains {
 /// Centres [m] in the order of `radii` [m] of spheres that are put at random places one by one, the largest
 /// first, where they overlap none of those before, nor of those that `stand` there (random sequential
 /// addition); inside the box along axes that do not repeat. Numbers of (seed, stream, grain, try) decide.
-/// Equal spheres fill up to about 0.35 of space. Throws std::invalid_argument when some grain finds no room in
-/// ten thousand tries.
+/// Equal spheres fill up to about 0.35 of space. Throws std::invalid_argument when some grain finds no room
+/// in ten thousand tries.
 std::vector<Vec3> scatter(std::span<const double> radii, const ScatterBox& box,
                           const StandingGrains& stand = {});
 

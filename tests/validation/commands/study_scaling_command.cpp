@@ -242,7 +242,7 @@ TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
 }
 
 TEST_F(StudyScaling, SaysWhichStepsTheSceneDoesNotHave) {
-  write(at("scene.toml"), replaced(pressed_box, "end = { steps = 6 }", "end = { equilibrium = 1e9 }"));
+  write(at("scene.toml"), replaced(pressed_box, "end = { steps = 6 }", "end = { time = 6e-3 }"));
   const Outcome outcome = run("study scaling scene.toml --out s --steps 50:60 --subdomains 2 --repeat 0");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_NE(outcome.messages.find("--steps"), std::string::npos) << outcome.messages;
