@@ -183,12 +183,13 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
   if (solver.direct_bodies > 0 && tally.unconverged > tally.jammed &&
       tally.worst_balance >= StepErrorThresholds{}.unknown)
     terminal.warn(
-        "warning: where `balance` in steps.csv is 1 or more nothing is known of some small cluster of "
-        "contacts: within {} sweeps its direct solve found no answer. Raise solver.max_iterations, or leave "
+        "warning: where `balance` in steps.csv is 1 or more contacts are far from an answer, or nothing is "
+        "known of some small cluster of them: within {} sweeps its direct solve found no answer. Raise "
+        "solver.max_iterations, or leave "
         "such clusters to estimates, which may take a wrong step for right: solver.direct_bodies = 0 "
         "(docs/certificate.md)",
         solver.max_iterations);
-  // Of steps that other tolerances missed it says nothing.
+  // A step that another tolerance missed may have contacts that are all right: to name one would mislead.
   if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > solver.tolerance)
     terminal.warn(
         "warning: of the steps that missed, step {} is the furthest off: at the contact of {} by {:.2g} of "

@@ -43,8 +43,8 @@ void add_gravity(const io::Scene& scene, std::vector<std::string>& warnings) {
         fmt::format("gravity of stage '{}' is ({:g}, {:g}, {:g}) m/s^2", stage.name, g[0], g[1], g[2]);
     if (g[2] > 0)
       warnings.push_back(where + ", upwards: z points up");
-    else if (g.norm() > 0 && !stage.laws.attract() &&
-             (!scene.setup.walls.empty() || scene.setup.domain.repeats) &&
+    else if (g.norm() > 0 &&
+             (scene.setup.walls.empty() ? scene.setup.domain.repeats : !stage.laws.attract()) &&
              std::ranges::none_of(scene.setup.walls,
                                   [&](const Wall& wall) { return stands_against(wall, g); }))
       warnings.push_back(where + ", and no wall stands against it: the grains fall for ever");

@@ -38,8 +38,8 @@ using detail::write_machine;
 using detail::write_plan;
 using detail::write_tasks;
 
-constexpr std::int64_t format_version =
-    7;  // 4: texts of variable length; 5: no checksums; 6: nothing of the threads that `whole` keeps busy
+// 4: texts of variable length; 5: no checksums; 6: nothing of the threads that `whole` keeps busy
+constexpr std::int64_t format_version = 7;
 
 /// A trace file, opened and known to be one.
 Hdf5Object open_trace(const std::string& path) {

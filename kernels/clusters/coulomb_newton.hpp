@@ -30,12 +30,13 @@ struct CoulombThresholds {
   /// the last, > 1, as contacts may change; or if that is more all that would follow if they did not, as a
   /// firmness >> 1 shows. (In a heap of 190 grains at rest 300 further steps changed at most 1.4 times as
   /// much.) And if they did not no impulse would creep on by more than so many times, `forces` > 0, the
-  /// error that is asked for, relative to the largest; where that is at most `fine`, in (0, 1). What is asked
-  /// for less finely is of velocities: beds at rest would be left without an answer.
+  /// error that is asked for, relative to the largest; where that is at most `fine`, in (0, 1) (of a step a
+  /// fifth of balance_tolerance: CertificateThresholds::velocity_resolution). What is asked for less finely
+  /// is of velocities: beds at rest would be left without an answer.
   struct Known {
     std::int32_t loops = SmallClusters{}.loops;
     double left = 0.02, to_come = 0.5;
-    double steps = 20, firmness = 1e9, forces = 2, fine = 1e-3;
+    double steps = 20, firmness = 1e9, forces = 2, fine = 1.1e-3;
   };
   Known known = {};
 };

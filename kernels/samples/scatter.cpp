@@ -103,10 +103,11 @@ std::vector<Vec3> scatter(std::span<const double> radii, const ScatterBox& box, 
     std::uint32_t attempt = 0;
     do {
       if (attempt == most_tries)
-        throw std::invalid_argument("random sample: no room for a grain of radius " +
-                                    std::to_string(radii[k]) + " m behind " + std::to_string(done) + " of " +
-                                    std::to_string(radii.size()) +
-                                    "; make the space larger, or count smaller");
+        throw std::invalid_argument(
+            "random sample: no room for a grain of radius " + std::to_string(radii[k]) + " m behind " +
+            std::to_string(done) + " of " + std::to_string(radii.size()) +
+            "; make the space larger, or count smaller" +
+            (stand.x.empty() ? "" : ", or put this sample before those of smaller grains"));
       centres[k] = place_of(box, radii[k], k, attempt++);
     } while (placed.overlaps(centres[k], radii[k]));
     placed.add(centres[k], radii[k]);

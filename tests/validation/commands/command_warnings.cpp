@@ -50,6 +50,11 @@ TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
                         "density = 2600\ncohesion = 1e-3")),
             "")
       << "it may hang";
+  EXPECT_NE(of("gravity = [0, 0, -9.81]\n" +
+               replaced(cell_scene, "density = 2600", "density = 2600\ncohesion = 1e-3"))
+                .find("no wall stands against it"),
+            std::string::npos)
+      << "there is nothing to hang from";
 }
 
 TEST_F(Warnings, OfADensityInOtherUnits) {

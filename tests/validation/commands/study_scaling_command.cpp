@@ -238,7 +238,7 @@ TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
   refused("--smpi no-such-talus", "no-such-talus");
   refused("--beside scene.toml", "name,cores,speedup");
   refused("--steps 12:13", "the scene ends after 12 steps");
-  refused("--steps 2:3 --subdomains 1,4 --weak 4000", "--no-weak");
+  refused("--steps 2:3 --subdomains 1,4 --weak 4000", "of 4000 cores cannot be made");
 }
 
 TEST_F(StudyScaling, SaysWhichStepsTheSceneDoesNotHave) {
