@@ -8,7 +8,6 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "kernels/bodies/larger.hpp"
-#include "kernels/clusters/step_error.hpp"
 
 namespace talus {
 
@@ -25,7 +24,10 @@ void Tally::add(const Simulation& simulation) {
     ++stagnated;
     floor = std::max(floor, report.error_rms);
   }
-  if (simulation.iterations().jammed) ++jammed;
+  if (simulation.iterations().jammed)
+    ++jammed;
+  else if (simulation.iterations().unanswered && !report.converged)
+    ++unanswered;
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
   if (report.converged) worst_velocity = larger(worst_velocity, report.velocity_error);
@@ -180,15 +182,13 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         name_of(*tally.deepest.overlapping, simulation.setup().walls), tally.deepest.step,
         remedy_of_overlaps(tally, simulation.setup().walls));
   const SolverSettings& solver = simulation.setup().solver;
-  if (solver.direct_bodies > 0 && tally.unconverged > tally.jammed &&
-      tally.worst_balance >= StepErrorThresholds{}.unknown)
+  if (tally.unanswered > 0)
     terminal.warn(
-        "warning: where `balance` in steps.csv is 1 or more contacts are far from an answer, or nothing is "
-        "known of some small cluster of them: within {} sweeps its direct solve found no answer. Raise "
-        "solver.max_iterations, or leave "
-        "such clusters to estimates, which may take a wrong step for right: solver.direct_bodies = 0 "
-        "(docs/certificate.md)",
-        solver.max_iterations);
+        "warning: in {} nothing is known of some small cluster of contacts: within {} sweeps its direct "
+        "solve "
+        "found no answer, and `balance` is 1 or more. Raise solver.max_iterations, or leave such clusters to "
+        "estimates, which may take a wrong step for right: solver.direct_bodies = 0 (docs/certificate.md)",
+        counted(static_cast<std::size_t>(tally.unanswered), "step"), solver.max_iterations);
   // A step that another tolerance missed may have contacts that are all right: to name one would mislead.
   if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > solver.tolerance)
     terminal.warn(

@@ -18,10 +18,11 @@ namespace talus {
 /// What the steps of a run came to, taken together.
 struct Tally {
   std::int64_t unconverged = 0;
-  std::int64_t passed = 0;     ///< pairs that went through one another
-  std::int64_t stagnated = 0;  ///< steps
-  double floor = 0;            ///< worst error at which a step stood still
-  std::int64_t jammed = 0;     ///< steps without a solution
+  std::int64_t passed = 0;      ///< pairs that went through one another
+  std::int64_t stagnated = 0;   ///< steps
+  double floor = 0;             ///< worst error at which a step stood still
+  std::int64_t jammed = 0;      ///< steps without a solution
+  std::int64_t unanswered = 0;  ///< others that missed, in which a small cluster has no answer
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;

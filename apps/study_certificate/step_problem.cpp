@@ -203,7 +203,9 @@ bool StepProblem::smooth() const {
 }
 
 void demand_audited(const Setup& setup) {
-  const auto refuse = [](const std::string& what) { throw std::invalid_argument("the audit knows " + what); };
+  const auto refuse = [](const std::string& what) {
+    throw std::invalid_argument("the audit knows " + what + "; give it other scenes");
+  };
   if (!setup.clumps.empty()) refuse("spheres only, no clumps");
   if (!setup.inserts.empty()) refuse("no grains that are inserted");
   for (const Wall& wall : setup.walls) {

@@ -118,7 +118,7 @@ double weak_part(const std::vector<int>& all, int n) {
 void demand_weak_sample(const StudyScalingOptions& options, const std::vector<int>& all) {
   try {
     scaled_sample(options.scene, options.overrides, options.stage, weak_part(all, all.front()));
-  } catch (const std::exception& error) {
+  } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(
         fmt::format("the sample of weak scaling for {} of {} cores cannot be made: {}; ask for others with "
                     "--weak, or for none with --no-weak",

@@ -340,7 +340,7 @@ class SceneReader {
         fail_at(*node, fmt::format("{}.{}", end_path, key),
                 "needs a periodic cell that flows in this stage: [cell], and rates or a stress");
     const bool ends_else = end.steps || end.time || end.equilibrium || end.by_memory();
-    if (end.shear_strain && !(flows && stage.shears()) && !ends_else && !end.strain)
+    if (end.shear_strain && !stage.shears() && !ends_else && !end.strain)
       fail_at(*node, end_path + ".shear_strain",
               "the cell has no stress in this stage, and no rates that change its shape: it would never end");
     const bool of_cell = scene_.setup.domain.edges()[end.strain_axis] > 0;

@@ -38,7 +38,7 @@ using detail::write_machine;
 using detail::write_plan;
 using detail::write_tasks;
 
-// 4: texts of variable length; 5: no checksums; 6: nothing of the threads that `whole` keeps busy
+// 4: texts of variable length; 5: no checksums; 6: nothing of what threads can share of `whole`
 constexpr std::int64_t format_version = 7;
 
 /// A trace file, opened and known to be one.

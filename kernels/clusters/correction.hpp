@@ -56,7 +56,8 @@ struct ClusterGoal {
   double enough = 0;    ///< momentum that need not be told apart [N s]
   double relative = 0;  ///< the same over the cluster's scale
   int sweeps = 0;       ///< that the step has had: what an answer may cost grows with them
-  double still = 0;     ///< [m/s]: velocities that rounding of positions makes in gaps say nothing of forces
+  double still =
+      0;  ///< [m/s]: slower normal velocities may be rounding of positions, and say nothing of forces
 };
 
 /// What would set all contacts right, and how well that is known. Momenta are sum m |u| + (I/R^2) |w|.

@@ -107,7 +107,9 @@ class CoulombStep {
   /// motion: the R with H^T R = -(v + H^T d) at those that carry. That step has changed their impulses by
   /// what this asks for over rho, and has left a `residual`: (M + K) R = H (r(d) - t) - residual, of which K
   /// = H P' rho H^T need not have an inverse, and is made so firm that M hardly counts. To the impulses: what
-  /// they would take from there. Infinite where there is no solution.
+  /// that firm step from there would add, r - t as often as it is firmer less P' rho H^T R; at contacts that
+  /// open in this step all of t counts so, as who carries is then still being decided. Infinite where there
+  /// is no solution.
   LinearRest linear_rest(const Vector& d, double firmness, double firm_enough, const std::vector<Vec3>& t,
                          double& work) const {
     const double times = firm_enough / firmness;

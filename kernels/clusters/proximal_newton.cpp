@@ -68,7 +68,7 @@ class ProximalSteps {
     return now;
   }
 
-  /// Without friction: what pushes the forces on is rounding of the gaps.
+  /// Without friction: what pushes the forces on is rounding, of the gaps or of the velocities.
   bool at_rest() const { return closing_ <= larger(still_, thresholds_.rounding * larger(fastest_, asked_)); }
 
   /// Without friction: along the last change of the impulses to where the dual objective 1/2 |V(r)|_M^2 +

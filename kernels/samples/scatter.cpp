@@ -104,7 +104,7 @@ std::vector<Vec3> scatter(std::span<const double> radii, const ScatterBox& box, 
     do {
       if (attempt == most_tries)
         throw std::invalid_argument(
-            "random sample: no room for a grain of radius " + std::to_string(radii[k]) + " m behind " +
+            "random sample: no room for a grain of radius " + std::to_string(radii[k]) + " m after " +
             std::to_string(done) + " of " + std::to_string(radii.size()) +
             "; make the space larger, or count smaller" +
             (stand.x.empty() ? "" : ", or put this sample before those of smaller grains"));

@@ -187,6 +187,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
     mends_ = error.mends;
     // Sweeps go on where others can still be put right.
     result_.jammed = error.jammed && !error.mends;
+    result_.unanswered = !error.solved;
     if (!error.solved) {
       ++doubts_;
       doubted_at_ = result_.iterations;

@@ -36,10 +36,11 @@ struct IterationResult {
   int corrections = 0;  ///< times that small clusters were put right
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
-  bool diverged = false;   ///< the error grows without bound
-  bool stagnated = false;  ///< more sweeps would not have made the error smaller
-  bool jammed = false;     ///< there is no solution: walls close on grains that cannot get away
-  WorstErrors worst;       ///< where it did not converge
+  bool diverged = false;    ///< the error grows without bound
+  bool stagnated = false;   ///< more sweeps would not have made the error smaller
+  bool jammed = false;      ///< there is no solution: walls close on grains that cannot get away
+  bool unanswered = false;  ///< how wrong a small cluster is nobody knows: its direct solve found no answer
+  WorstErrors worst;        ///< where it did not converge
 };
 
 /// Every number that a verdict depends on, besides the tolerances that the user sets (SolverSettings).

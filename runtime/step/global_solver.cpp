@@ -4,7 +4,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "kernels/clusters/cluster_work.hpp"
@@ -14,79 +13,13 @@
 #include "kernels/global/residuals.hpp"
 #include "kernels/global/stiffness.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/step/step_link.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
 namespace talus {
 
 namespace {
-
-/// The copies agree by the messages of the gluing; rows travel to all ranks; threads share the subdomains.
-class StepLink final : public PartLink {
- public:
-  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew,
-           trace::Meetings& rounds, trace::SharedWork& shared)
-      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew), rounds_(rounds), shared_(shared) {}
-
-  bool several() const override { return state_.decomposition.several(); }
-
-  void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
-    if (ranks_.trace() == nullptr) return crew_.share(parts, work);
-    std::vector<double> seconds(parts);
-    const double began = graph::seconds_now();
-    crew_.share(parts, [&](std::size_t part) {
-      const double from = graph::seconds_now();
-      work(part);
-      seconds[part] = graph::seconds_now() - from;
-    });
-    shared_.elapsed += graph::seconds_now() - began;
-    shared_.all += std::accumulate(seconds.begin(), seconds.end(), 0.0);
-    shared_.longest += seconds.empty() ? 0 : *std::ranges::max_element(seconds);
-  }
-
-  void sum_copies(PartField& field) const override {
-    if (!state_.decomposition.several()) return;
-    count(rounds_.exchanges);
-    gluing_.sum_copies(field);
-  }
-
-  std::vector<double> gather(std::vector<std::vector<double>> rows) const override {
-    count(rounds_.gathers);
-    const Decomposition& all = state_.decomposition;
-    const std::size_t width = rows.front().size();
-    std::vector<double> here;
-    here.reserve(rows.size() * width);
-    for (const std::vector<double>& row : rows) here.insert(here.end(), row.begin(), row.end());
-    if (ranks_.ranks() == 1) return here;
-    std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
-    for (std::int32_t rank : all.rank_of) lengths[static_cast<std::size_t>(rank)] += width;
-    const auto pending = ranks_.start_gather(std::move(here), lengths);
-    const std::vector<double>& by_rank = pending->wait();
-    // Within a rank rows stand in order of subdomain.
-    std::vector<std::size_t> next(lengths.size(), 0);
-    for (std::size_t r = 1; r < next.size(); ++r) next[r] = next[r - 1] + lengths[r - 1];
-    std::vector<double> sorted;
-    sorted.reserve(by_rank.size());
-    for (std::int32_t rank : all.rank_of) {
-      const auto begin = by_rank.begin() + static_cast<std::ptrdiff_t>(next[static_cast<std::size_t>(rank)]);
-      sorted.insert(sorted.end(), begin, begin + static_cast<std::ptrdiff_t>(width));
-      next[static_cast<std::size_t>(rank)] += width;
-    }
-    return sorted;
-  }
-
- private:
-  static void count(std::uint16_t& calls) {
-    if (calls < trace::Meetings::most) ++calls;
-  }
-
-  const StepState& state_;
-  Gluing& gluing_;
-  const graph::Communicator& ranks_;
-  graph::Crew& crew_;
-  trace::Meetings& rounds_;
-  trace::SharedWork& shared_;
-};
 
 /// Kinetic energy of the velocities that impulses make, twice [J].
 double energy_of(const BodyParts& parts) {
@@ -177,7 +110,7 @@ class GlobalSolver::Whole {
     solver.shared_ = {};
   }
   ~Whole() {
-    solver_.rounds_.threads = solver_.shared_.threads(graph::seconds_now() - began_);
+    solver_.shared_.tell(graph::seconds_now() - began_, solver_.rounds_);
     span_.set_node(solver_.rounds_.packed());
   }
   Whole(const Whole&) = delete;

@@ -166,16 +166,20 @@ class Span {
   std::int64_t begin_ = 0;
 };
 
-/// Work that threads have shared, piece by piece, in a span that a trace records.
+/// Work that threads have shared, piece by piece, in a span that a trace records [s].
 struct SharedWork {
-  double elapsed = 0;  ///< [s] from its beginning to its end
-  double all = 0;      ///< [s] of all pieces, each as long as its thread took
-  double longest = 0;  ///< [s] of the longest one
+  double elapsed = 0;  ///< while they did
+  double waited = 0;   ///< for other ranks
+  double all = 0;      ///< of all pieces, each as long as its thread took
+  double longest = 0;  ///< of the longest one
 
-  /// As many as a span of so many seconds can keep busy, whose rest is one thread's: >= 1.
-  double threads(double span) const {
-    const double rest = std::max(span - elapsed, 0.0), least = rest + longest;
-    return least > 0 ? std::max(1.0, (rest + all) / least) : 1;
+  /// Puts the shares of the work of a span of so many seconds into `meetings`: what nobody shared is one
+  /// thread's.
+  void tell(double span, Meetings& meetings) const {
+    const double rest = std::max(span - elapsed - waited, 0.0), work = rest + all;
+    if (!(work > 0)) return;
+    meetings.alone = rest / work;
+    meetings.longest = longest / work;
   }
 };
 

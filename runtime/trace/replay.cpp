@@ -294,6 +294,12 @@ class Player {
     if (read_next) {
       const std::size_t last = epochs.size() - 1, like = last >= 2 ? last - 2 : 0;
       SimEpoch sweep = epochs[like], undo = epochs[last >= 1 ? last - 1 : 0];
+      // What was done at their decisions is theirs.
+      for (SimEpoch* more : {&sweep, &undo}) {
+        more->whole = more->meetings = 0;
+        more->spans.clear();
+        std::ranges::fill(more->own, 0.0);
+      }
       const bool waits = recorded.check[like].exists() && !reads_later(like);
       sweep.gate = undo.gate = true;
       do_together(index, last, sweep);
@@ -316,25 +322,30 @@ class Player {
   }
 
   /// Adds what all ranks did together within the check of recorded epoch e. As long as the rank with the
-  /// largest share needs, or what one thread has to do alone (Meetings); threads that wait help, each with a
-  /// subdomain.
+  /// largest share needs; threads that wait help with the pieces of it, as many as there are subdomains, and
+  /// no faster than the longest piece takes one of them.
   void do_together(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
     for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
       const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
       const double scale = machine_.contacts / stage_.speed_of(record.kind());
-      double most = 0;
-      std::vector<double> works(index.ranks.size(), 0.0);
-      for (std::size_t s = 0; s < works.size(); ++s) {
+      std::vector<double> work(index.ranks.size(), 0.0);  // of one thread
+      std::vector<Meetings> shares(work.size());
+      double longest = 0, most = 0;
+      for (std::size_t s = 0; s < work.size(); ++s) {
         if (k >= index.ranks[s].whole[e].size()) continue;
         const Place place = index.ranks[s].whole[e][k];
-        const Meetings of_rank = Meetings::of(stage_.timeline.record(place).node);
-        works[s] = scale * stage_.timeline.self(place) * of_rank.busy(helpers(source_, s, trace_.threads));
-        if (of_rank.threads > 0) most = std::max(most, works[s] / of_rank.threads);
+        shares[s] = Meetings::of(stage_.timeline.record(place).node);
+        work[s] =
+            scale * stage_.timeline.self(place) / shares[s].time_on(helpers(source_, s, trace_.threads));
+        longest = std::max(longest, shares[s].longest * work[s]);
       }
       for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) {
-        double work = 0;
-        for (std::size_t s = 0; s < works.size(); ++s) work += share(r, s) * works[s];
-        most = std::max(most, work / helpers(rank_of_, r, machine_.threads));
+        double alone = 0, shared = 0;
+        for (std::size_t s = 0; s < work.size(); ++s) {
+          alone += share(r, s) * shares[s].alone * work[s];
+          shared += share(r, s) * (1 - shares[s].alone) * work[s];
+        }
+        most = std::max(most, alone + std::max(shared / helpers(rank_of_, r, machine_.threads), longest));
       }
       epoch.spans.push_back({epoch.whole, epoch.whole + most, record.node, record.kind()});
       epoch.whole += most;

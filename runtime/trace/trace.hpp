@@ -66,24 +66,33 @@ inline bool is_communication(Kind kind) {
   return kind == kind_send || kind == kind_receive || kind == kind_collective;
 }
 
-/// How often all ranks communicate in a task that they do together: gathers of numbers on all ranks, and
-/// exchanges of copies between all subdomains, both at most `most`; and how many threads it can keep busy, as
-/// one has to do what belongs together. Within a check it is Record::node of its span.
+/// Of a task that all ranks do together, what its time on another machine follows from. Within a check it is
+/// Record::node of its span.
 struct Meetings {
-  static constexpr std::uint16_t most = 4095;
+  static constexpr std::uint16_t most = 1023;
+  /// How often they communicate, at most `most` each: gathers of numbers on all ranks, and exchanges of
+  /// copies between all subdomains.
   std::uint16_t gathers = 0, exchanges = 0;
-  double threads = 0;  ///< >= 1, kept in quarters; 0: as many as there are, which those from 64 on become
+  /// Of the work of a rank, in [0, 1] and together at most 1: what one thread does before and after the
+  /// others can help, and the longest of the pieces that they share, such as the direct solve of a cluster.
+  /// Kept in parts of 1/63.
+  double alone = 0, longest = 0;
+
   std::uint32_t packed() const {
-    const double quarters = std::round(4 * threads);
-    const std::uint32_t kept = quarters < 256 ? static_cast<std::uint32_t>(quarters) : 0;
-    return std::uint32_t{gathers} << 20 | std::uint32_t{exchanges} << 8 | kept;
+    const auto kept = [](double share) { return static_cast<std::uint32_t>(std::lround(parts * share)); };
+    const std::uint32_t first = kept(alone);
+    return std::uint32_t{gathers} << 22 | std::uint32_t{exchanges} << 12 | first << 6 |
+           std::min(kept(longest), std::uint32_t{parts} - first);
   }
   static Meetings of(std::uint32_t packed) {
-    return {static_cast<std::uint16_t>(packed >> 20), static_cast<std::uint16_t>(packed >> 8 & most),
-            0.25 * (packed & 0xffU)};
+    return {static_cast<std::uint16_t>(packed >> 22), static_cast<std::uint16_t>(packed >> 12 & most),
+            (packed >> 6 & parts) / double{parts}, (packed & parts) / double{parts}};
   }
-  /// Of `there` threads, >= 1, those that it keeps busy.
-  double busy(double there) const { return threads > 0 ? std::min(there, threads) : there; }
+  /// The time that so many threads, >= 1, take, over that of one.
+  double time_on(double threads) const { return alone + std::max((1 - alone) / threads, longest); }
+
+ private:
+  static constexpr std::uint8_t parts = 63;
 };
 
 /// One task, or one span within a task (then it lies within the task's time, on the same track).

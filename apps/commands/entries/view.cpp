@@ -36,7 +36,7 @@ void add_view_options(CLI::App& app, ViewCommandOptions& options) {
       ->type_name("N")
       ->capture_default_str();
   app.add_option("-o,--out", options.out,
-                 "a .png, or a .svg, along with its scale of colours [view.png in the directory]")
+                 "a .png, or a .svg, which shows the scale of colours, too [view.png in the directory]")
       ->type_name("FILE");
 }
 

@@ -217,8 +217,9 @@ Section<SampleSpec> sample_keys() {
       "rad/s), then perhaps `material`; `state` begins where a run was: spheres with their velocities, "
       "forces where contacts are, and walls of the same names that have no place of their own; `body` is "
       "one sphere; `random` puts `count` grains at random places of a box or of the periodic cell, each "
-      "where it overlaps none, nor a grain of a sample before (up to a solid fraction of about 0.35, the "
-      "largest first). A scene with an `[[insert]]` may do without any.",
+      "where it overlaps none, nor a grain of a sample before; samples behind it must leave it room. The "
+      "largest come first, up to a solid fraction of about 0.35. A scene with an `[[insert]]` may do without "
+      "any.",
       std::move(keys)};
 }
 

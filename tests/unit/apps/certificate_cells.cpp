@@ -218,14 +218,16 @@ TEST(CertificateCells, OfFewGrainsAreAsRightAsTheyClaim) {
 /// Velocities are known, and forces that redundant contacts share would creep on by 40 % of the largest: an
 /// answer of that kind was off by 7 times the claim.
 TEST(CertificateCells, WithFrictionForcesThatCreepAreNoAnswer) {
-  const AuditedRun run = audited_cell(make_scene("cell", 29, {}), 1);
-  ASSERT_EQ(run.steps.size(), 1U);
-  const AuditedStep& step = run.steps.front();
-  ASSERT_EQ(step.judged, Judged::yes);
-  EXPECT_TRUE(step.certified);
-  const auto& [V, wf, cf, cluster, energy] = step.errors;
-  EXPECT_LE(wf, step.claimed);
-  EXPECT_LE(cf, step.claimed);
+  for (const double tolerance : {1e-3, 5e-3}) {  // coarser ones do not ask
+    const AuditedRun run = audited_cell(make_scene("cell", 29, {.tolerance = tolerance}), 1);
+    ASSERT_EQ(run.steps.size(), 1U);
+    const AuditedStep& step = run.steps.front();
+    ASSERT_EQ(step.judged, Judged::yes);
+    EXPECT_TRUE(step.certified);
+    const auto& [V, wf, cf, cluster, energy] = step.errors;
+    EXPECT_LE(wf, step.claimed) << tolerance;
+    EXPECT_LE(cf, step.claimed) << tolerance;
+  }
 }
 
 TEST(CertificateCells, KeptAsFilesAreTheSameScenes) {

@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
+#include <regex>
 #include <set>
 
 #include "apps/shared/exit_codes.hpp"
@@ -16,7 +20,9 @@
 #include "apps/study_certificate/calibration.hpp"
 #include "apps/study_certificate/certificate_report.hpp"
 #include "apps/study_certificate/scene_maker.hpp"
+#include "apps/study_certificate/step_problem.hpp"
 #include "apps/study_certificate/study_certificate.hpp"
+#include "io/files/output_directory.hpp"
 #include "kernels/samples/sample.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
@@ -268,6 +274,45 @@ TEST(CertificateAudit, OfALatticeWithFrictionWhoseForcesComeSlowlyIsNotDeceived)
   // nothing, 15 % of the largest force away from an answer.
   const AuditedRun run = audited(make_scene("lattice", 880, {}), 20);
   EXPECT_GE(within_their_claims(run), 10);
+}
+
+TEST(CertificateStudy, KnowsWhatItHasNoFormulasFor) {
+  const auto known = [](const std::function<void(talus::Setup&)>& change) {
+    talus::Setup setup = make_scene("column", 3, {}).scene.setup;
+    change(setup);
+    try {
+      demand_audited(setup);
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+    return true;
+  };
+  EXPECT_TRUE(known([](talus::Setup&) {}));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.clumps.emplace_back(); }));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.inserts.emplace_back(); }));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().motion.emplace_back(); }));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().from_stage = "later"; }));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().until_stage = "later"; }));
+  EXPECT_FALSE(known(
+      [](talus::Setup& setup) { setup.stages.back().laws.set_all(&PairLaw::rolling_resistance, 0.1); }));
+}
+
+TEST(CertificateStudy, RefusesSuchScenesBeforeItWrites) {
+  const test::ScratchDirectory scratch;
+  const MadeScene made = make_scene("column", 3, {});
+  keep_scene(made, scratch.path());
+  const std::filesystem::path file = scratch / (made.scene.name + ".toml");
+  StudyCertificateOptions options;
+  options.scenes_from = file.string();
+  options.out = (scratch / "study").string();
+  std::ifstream in(file);
+  const std::string scene(std::istreambuf_iterator<char>(in), {});
+  io::write_whole(
+      file, std::regex_replace(scene, std::regex("rolling_resistance = 0.0"), "rolling_resistance = 0.1"));
+  EXPECT_EQ(study_certificate_command(options), exit_bad_input);
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+  io::write_whole(file, scene);
+  EXPECT_NE(study_certificate_command(options), exit_bad_input);
 }
 
 TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {

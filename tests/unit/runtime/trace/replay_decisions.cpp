@@ -155,7 +155,7 @@ TEST(ReplayDecisions, ACheckThatSettlesIsReadAtOnce) {
 
 /// A task in the last check of two subdomains, which takes 10 ns more: two gathers and three exchanges. Of
 /// kind sweep all ranks and threads do it together, of kind task each rank its part.
-Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep, double threads = 0) {
+Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep, double alone = 0, double longest = 0) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.tracks[0].records;
   const auto check = std::ranges::find(records, kind_check, &Record::kind);
@@ -163,7 +163,7 @@ Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep, double thre
   check->node = check_settles;
   std::prev(records.end())->begin += length + 10;
   records.insert(std::next(check), {check->begin + 10, static_cast<float>(length),
-                                    Meetings{2, 3, threads}.packed(), -1, pack(1, kind)});
+                                    Meetings{2, 3, alone, longest}.packed(), -1, pack(1, kind)});
   return trace;
 }
 
@@ -179,36 +179,52 @@ TEST(ReplayDecisions, WhatAllRanksDoInACheckIsShared) {
   EXPECT_NEAR(analyse(played.trace).exposed, 2 * 6 * 30, 1e-3);
 }
 
-/// As long as what one thread has to do alone, on however many; recorded on one thread or on two.
+/// 80 ns of one thread: what comes before the pieces, and then the pieces on two threads, the longest on one.
 TEST(ReplayDecisions, WhatOneThreadHasToDoAloneIsNotShared) {
   const double others = makespan(test::two_subdomains(1), bare(1, 2));
-  for (const auto& [threads, length] : {std::pair{1.0, 80.0}, {1.25, 64.0}, {2.0, 40.0}, {8.0, 40.0}}) {
-    const Trace trace = with_a_look(80, test::sweep, threads);
-    EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90) << threads;
-    EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 2)), others + 10 + length) << threads;
-    EXPECT_DOUBLE_EQ(makespan(trace, bare(2, 1)), 2 * 180 + 10 + length) << threads;
+  constexpr double ninth = 7.0 / 63;
+  struct Case {
+    double alone, longest, on_two_threads, on_two_ranks;  // of nine parts of the work
+  };
+  for (const auto& [alone, longest, on_two_threads, on_two_ranks] :
+       {Case{0, 9, 9, 9}, {0, 6, 6, 6}, {9, 0, 9, 4.5}, {3, 2, 3 + 3, 1.5 + 3}, {3, 4, 3 + 4, 1.5 + 4}}) {
+    const Trace trace = with_a_look(80, test::sweep, ninth * alone, ninth * longest);
+    EXPECT_NEAR(makespan(trace, bare(1, 1)), 4 * 180 + 90, 1e-9) << alone << ' ' << longest;
+    EXPECT_NEAR(makespan(trace, bare(1, 2)), others + 10 + 80 * on_two_threads / 9, 1e-9)
+        << alone << ' ' << longest;
+    EXPECT_NEAR(makespan(trace, bare(2, 1)), 2 * 180 + 10 + 80 * on_two_ranks / 9, 1e-9)
+        << alone << ' ' << longest;
     const Replay played = replay(Timeline(trace), bare(1, 2), true);
-    EXPECT_DOUBLE_EQ(makespan(played.trace, bare(1, 2)), played.makespan) << threads << ": played again";
-    EXPECT_NEAR(makespan(played.trace, bare(1, 1)), 4 * 180 + 90, 1) << threads << ": on one thread again";
+    EXPECT_NEAR(makespan(played.trace, bare(1, 2)), played.makespan, 1) << alone << ": played again";
+    EXPECT_NEAR(makespan(played.trace, bare(1, 1)), 4 * 180 + 90, 2) << alone << ": on one thread again";
   }
 }
 
 TEST(Meetings, KeepWhatTheyCount) {
-  for (const double threads : {0.0, 1.0, 2.75, 63.75}) {
-    const Meetings kept = Meetings::of(Meetings{Meetings::most, 17, threads}.packed());
+  for (const auto& [alone, longest] : {std::pair{0.0, 0.0}, {1.0, 0.0}, {0.0, 1.0}, {21.0 / 63, 42.0 / 63}}) {
+    const Meetings kept = Meetings::of(Meetings{Meetings::most, 17, alone, longest}.packed());
     EXPECT_EQ(kept.gathers, Meetings::most);
     EXPECT_EQ(kept.exchanges, 17);
-    EXPECT_EQ(kept.threads, threads);
+    EXPECT_EQ(kept.alone, alone);
+    EXPECT_EQ(kept.longest, longest);
   }
-  EXPECT_EQ(Meetings::of(Meetings{1, 2, 200}.packed()).threads, 0) << "as many as there are";
+  for (const double alone : {0.1, 0.25, 0.5, 0.9})
+    EXPECT_EQ(Meetings::of(Meetings{1, 2, alone, 1 - alone}.packed()).time_on(1), 1) << "rounding, too";
 }
 
-TEST(SharedWork, KeepsAsManyThreadsBusyAsItsLongestPieceLeavesRoomFor) {
-  EXPECT_EQ((SharedWork{1, 1, 1}.threads(1)), 1) << "one piece";
-  EXPECT_EQ((SharedWork{1, 1, 0.25}.threads(1)), 4) << "four";
-  EXPECT_EQ((SharedWork{1, 1, 0.25}.threads(1.5)), 2) << "and half a second before them";
-  EXPECT_EQ((SharedWork{0.5, 1, 0.25}.threads(0.5)), 4) << "the same by two threads";
-  EXPECT_EQ(SharedWork{}.threads(0), 1);
+/// A second before four pieces of a second each, on one thread and on four, as the others would be waited
+/// for.
+TEST(SharedWork, TellsWhatFollowsForOtherThreads) {
+  for (const auto& [work, span] : {std::pair{SharedWork{4, 0, 4, 1}, 5.0}, {SharedWork{1, 3, 4, 1}, 5.0}}) {
+    Meetings told;
+    work.tell(span, told);
+    told = Meetings::of(told.packed());
+    for (const auto& [threads, seconds] : {std::pair{1.0, 5.0}, {2.0, 3.0}, {4.0, 2.0}, {8.0, 2.0}})
+      EXPECT_NEAR(5 * told.time_on(threads), seconds, 5.0 / 63) << threads;
+  }
+  Meetings none;
+  SharedWork{}.tell(0, none);
+  EXPECT_EQ(none.time_on(2), 0.5);
 }
 
 // What one rank added up for both subdomains, two ranks add up for one each; a second thread of it waits.
@@ -240,6 +256,44 @@ TEST(ReplayDecisions, ALateCheckAddsUpOnce) {
   Machine machine = bare(2, 1);
   machine.late_check = true;
   EXPECT_DOUBLE_EQ(makespan(trace, machine), makespan(without, machine) + 10 + 40);
+}
+
+/// Nor is what the ranks did together in a check before done again in them. Checks behind each of four
+/// epochs, and in the first of them a look of so many ns.
+Trace with_an_early_look(std::int64_t length) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.tracks[0].records;
+  const Record before = records.front(), behind = records.back();
+  std::vector<Record> epoch;
+  for (const Record& record : records)
+    if (record.epoch == 0 && record.kind() != kind_check) epoch.push_back(record);
+  records = {before};
+  std::int64_t now = 0;
+  for (std::int32_t e = 0; e < 4; ++e) {
+    for (Record record : epoch) {
+      record.begin += now;
+      record.epoch = e;
+      records.push_back(record);
+    }
+    now += 360;
+    const std::int64_t look = e == 0 ? length : 0;
+    records.push_back({now, static_cast<float>(look), 0, e, pack(1, kind_check)});
+    if (look > 0) records.push_back({now, static_cast<float>(look), 0, -1, pack(1, test::sweep)});
+    now += look;
+  }
+  records.push_back(behind);
+  records.back().begin = now;
+  return trace;
+}
+
+TEST(ReplayDecisions, TheSweepThatHidesSumsDoesNoEarlierLookAgain) {
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.late_check = true;
+    EXPECT_DOUBLE_EQ(makespan(with_an_early_look(80), machine),
+                     makespan(with_an_early_look(0), machine) + 40);
+  }
 }
 
 // More contacts make chunks longer, not more of them.
