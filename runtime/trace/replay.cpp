@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 
 #include "runtime/trace/detail/simulation.hpp"
 
@@ -293,13 +292,7 @@ class Player {
     }
     if (read_next) {
       const std::size_t last = epochs.size() - 1, like = last >= 2 ? last - 2 : 0;
-      SimEpoch sweep = epochs[like], undo = epochs[last >= 1 ? last - 1 : 0];
-      // What was done at their decisions is theirs.
-      for (SimEpoch* more : {&sweep, &undo}) {
-        more->whole = more->meetings = 0;
-        more->spans.clear();
-        std::ranges::fill(more->own, 0.0);
-      }
+      SimEpoch sweep = epochs[like].undecided(), undo = epochs[last >= 1 ? last - 1 : 0].undecided();
       const bool waits = recorded.check[like].exists() && !reads_later(like);
       sweep.gate = undo.gate = true;
       do_together(index, last, sweep);
@@ -328,15 +321,15 @@ class Player {
     for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
       const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
       const double scale = machine_.contacts / stage_.speed_of(record.kind());
-      std::vector<double> work(index.ranks.size(), 0.0);  // of one thread
-      std::vector<Meetings> shares(work.size());
+      std::vector<Meetings> shares(index.ranks.size());
+      std::vector<double> work(shares.size(), 0.0);  // of one thread
       double longest = 0, most = 0;
       for (std::size_t s = 0; s < work.size(); ++s) {
         if (k >= index.ranks[s].whole[e].size()) continue;
         const Place place = index.ranks[s].whole[e][k];
         shares[s] = Meetings::of(stage_.timeline.record(place).node);
-        work[s] =
-            scale * stage_.timeline.self(place) / shares[s].time_on(helpers(source_, s, trace_.threads));
+        const double threads = helpers(source_, s, trace_.threads);
+        work[s] = scale * stage_.timeline.self(place) / shares[s].time_on(threads);
         longest = std::max(longest, shares[s].longest * work[s]);
       }
       for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) {

@@ -105,6 +105,15 @@ struct SimEpoch {
   Kind own_kind{};
   bool exchange = false;  ///< copies are glued
   std::size_t exchanges_before = 0;
+
+  /// The same without what is done at its decision.
+  SimEpoch undecided() const {
+    SimEpoch bare = *this;
+    bare.whole = bare.meetings = 0;
+    bare.spans.clear();
+    std::ranges::fill(bare.own, 0.0);
+    return bare;
+  }
 };
 
 /// The loop of one step as it is to be played. All of it must outlive the playing.
