@@ -55,17 +55,17 @@ struct Momenta {
   double all_exchanged() const { return std::accumulate(exchanged.begin(), exchanged.end(), 0.0); }
 };
 
-/// What is left of an error beyond what rounding of positions makes of it, so many times over.
-double beyond_rounding(const StepProblem& problem, double mass, double error, double times = 1) {
-  return std::max(0.0, error - times * mass * problem.rounding_speed);
+/// What is left of an error beyond what rounding of positions makes of it.
+double beyond_rounding(const StepProblem& problem, double mass, double error) {
+  return std::max(0.0, error - floors.rounding * mass * problem.rounding_speed);
 }
 
 Momenta momenta(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   Momenta found;
   const Motion &exact = reference.motion, &free = problem.free;
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    found.wrong.push_back(beyond_rounding(
-        problem, problem.mass[k], problem.mass[k] * (end.after.u[k] - exact.u[k]).norm(), floors.rounding));
+    found.wrong.push_back(
+        beyond_rounding(problem, problem.mass[k], problem.mass[k] * (end.after.u[k] - exact.u[k]).norm()));
     found.exchanged.push_back(problem.mass[k] * (exact.u[k] - free.u[k]).norm());
   }
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
@@ -203,9 +203,10 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
   };
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
     const double m = problem.mass[k], inertia = 0.4 * m;
+    // Not from positions: those that `overlap_correction` shifts do not fall or rise by their motion.
+    const Vec3 moved = problem.time_step / 2 * (before.u[k] + after.u[k]);
     gained += 0.5 * m * (after.u[k].squaredNorm() - before.u[k].squaredNorm()) -
-              m * problem.gravity.dot(after.x[k] - before.x[k]) +
-              0.5 * inertia * (spin(after, k) - spin(before, k));
+              m * problem.gravity.dot(moved) + 0.5 * inertia * (spin(after, k) - spin(before, k));
     free += 0.5 * m * problem.free.u[k].squaredNorm() + 0.5 * inertia * spin(before, k);
     fall += m * (problem.time_step * problem.gravity).squaredNorm() / 8;
   }

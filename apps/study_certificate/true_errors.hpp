@@ -39,7 +39,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
 double disagreement(const StepProblem& problem, const StepEnd& end);
 
 /// Energy that a step gained beyond the share that the scheme itself may add, m (h g)^2/8 a grain
-/// (docs/theory.md), over its kinetic energy without contacts.
+/// (docs/theory.md), over its kinetic energy without contacts. Heights change by the motion: what
+/// `overlap_correction` shifts sets nothing in motion and does not count.
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
 
 }  // namespace talus::audit

@@ -362,13 +362,24 @@ TEST(CertificateErrors, OfAContactInARowAreNotWhatRoundingMakesOfItsGrains) {
   // Impulses of the size of rounding: the middle contact passes on what is between both halves.
   std::vector<Vec3> r = answer.r;
   for (std::size_t c = 0; c < r.size(); ++c) {
-    answer.r[c] = 20 * mass_of(R) * problem.rounding_speed * problem.contacts[c].normal;
+    answer.r[c] = 100 * mass_of(R) * problem.rounding_speed * problem.contacts[c].normal;
     r[c] = 0.7 * answer.r[c];
   }
   const StepEnd end{ended(problem, step, answer.exact), r};
   EXPECT_EQ(true_errors(problem, answer, end).contact_force, 0);
   r.assign(r.size(), Vec3::Zero());
   EXPECT_GT(true_errors(problem, answer, {ended(problem, step, answer.exact), r}).contact_force, 0.1);
+}
+
+TEST(CertificateErrors, EnergyGrowsByMotionAndNotByWhatTheCorrectionOfOverlapsLifts) {
+  Step step(g, 0);
+  step.grain(Vec3::Zero(), R, {0, 0, 1});
+  Frame after = step.before;
+  after.u[0][2] = 1 - g * h;
+  after.x[0][2] = h + 1e-3 * R;
+  EXPECT_EQ(energy_gain(step.problem(), step.before, after), 0);
+  after.u[0][2] = 1;  // its weight has not slowed it
+  EXPECT_NEAR(energy_gain(step.problem(), step.before, after), 2 * g * h, 0.1 * g * h);
 }
 
 TEST(CertificateErrors, OfOneClusterDoNotHideAmongOthers) {
