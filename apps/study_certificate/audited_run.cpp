@@ -89,6 +89,11 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
 
 }  // namespace
 
+bool AuditedRun::gave_up() const {
+  if (ended.empty() || steps.empty()) return false;
+  return !steps.back().certified || steps.back().overlapping;
+}
+
 AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
                      const std::function<void(const AuditedStep&)>& progress) {
   AuditedRun run;

@@ -43,6 +43,10 @@ struct AuditedStep {
 struct AuditedRun {
   std::vector<AuditedStep> steps;
   std::string ended;  ///< "" when all steps were done; else the error that ended the run
+
+  /// An error did, behind a step that says of itself that it does not hold, as where pushed walls pass one
+  /// another: the run has fooled nobody.
+  bool gave_up() const;
 };
 
 struct AuditPlan {

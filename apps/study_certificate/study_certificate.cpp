@@ -39,7 +39,8 @@ class Progress {
   explicit Progress(std::size_t scenes) : scenes_(scenes) {}
 
   std::vector<StepOfScene> steps;
-  std::vector<std::string> ended;  ///< runs that an error ended
+  std::vector<std::string> gave_up;  ///< runs that an error ended behind steps that do not hold
+  std::vector<std::string> ended;    ///< that one ended behind certified steps, or none
 
   /// Audits one scene and takes its steps.
   void audit(const io::Scene& scene, const std::string& family, const Sample& grains, const AuditPlan& plan) {
@@ -53,9 +54,9 @@ class Progress {
     } catch (const std::exception& error) {
       run.ended = error.what();
     }
+    if (!run.ended.empty()) (run.gave_up() ? gave_up : ended).push_back(scene.name + ": " + run.ended);
     const double tolerance = placed.setup.solver.tolerance;
     for (AuditedStep& step : run.steps) steps.push_back({scene.name, family, tolerance, std::move(step)});
-    if (!run.ended.empty()) ended.push_back(scene.name + ": " + run.ended);
     ++done_;
   }
 
@@ -176,6 +177,8 @@ int conclude(const Progress& progress, std::size_t scenes, const std::string& di
   say(fmt::format("calibration.csv, steps.csv, pictures and report.html in {}", directory));
   const std::vector<std::string> broken = broken_bounds(rows, {});
   for (const std::string& sentence : broken) print_error("talus: error: {}\n", sentence);
+  for (const std::string& sentence : progress.gave_up)
+    say(fmt::format("gave up, as its steps had said: {}", sentence));
   for (const std::string& sentence : progress.ended) print_error("talus: error: {}\n", sentence);
   return broken.empty() && progress.ended.empty() ? exit_done : exit_failure;
 }

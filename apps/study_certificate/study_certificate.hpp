@@ -30,7 +30,8 @@ struct StudyCertificateOptions {
 void add_study_certificate_options(CLI::App& app, StudyCertificateOptions& options);
 
 /// Audits the scenes, prints the calibration, writes tables, pictures, report.html and the worst scenes.
-/// Returns an ExitCode: exit_failure when a bound is broken or a run ended by an error.
+/// Returns an ExitCode: exit_failure when a bound is broken, or an error ended a run that had not given up
+/// (AuditedRun::gave_up).
 int study_certificate_command(const StudyCertificateOptions& options);
 
 }  // namespace talus

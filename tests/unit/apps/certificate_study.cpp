@@ -315,6 +315,31 @@ TEST(CertificateStudy, RefusesSuchScenesBeforeItWrites) {
   EXPECT_NE(study_certificate_command(options), exit_bad_input);
 }
 
+TEST(CertificateStudy, ARunThatEndsByAnErrorHasGivenUpOnlyBehindAStepThatDoesNotHold) {
+  AuditedRun run;
+  EXPECT_FALSE(run.gave_up());
+  run.ended = "walls have passed one another";
+  EXPECT_FALSE(run.gave_up());
+  run.steps.emplace_back().certified = true;
+  EXPECT_FALSE(run.gave_up());
+  run.steps.back().overlapping = true;
+  EXPECT_TRUE(run.gave_up());
+  run.steps.back() = {};
+  EXPECT_TRUE(run.gave_up());
+  run.ended.clear();
+  EXPECT_FALSE(run.gave_up());
+}
+
+TEST(CertificateStudy, WallsThatPassOneAnotherBehindOverlapsFailNoStudy) {
+  const test::ScratchDirectory scratch;
+  StudyCertificateOptions options;
+  options.scenes = 1;
+  options.seed = 470;
+  options.families = {"press"};
+  options.out = (scratch / "press").string();
+  EXPECT_EQ(study_certificate_command(options), exit_done);
+}
+
 TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {
   const test::ScratchDirectory scratch;
   StudyCertificateOptions options;
