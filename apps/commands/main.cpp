@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <hdf5.h>
 #include <malloc.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -130,13 +131,20 @@ void give_back_arrays() {
 #endif
 }
 
-/// The exit code of a command that ended with `code`: results that stdout did not take are an error.
+/// Nobody reads the pipe any more that stdout is, as `head` when it has seen what it wanted.
+bool reader_has_gone() {
+  pollfd out{STDOUT_FILENO, 0, 0};
+  return ::poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0;
+}
+
+/// The exit code of a command that ended with `code`: results that stdout did not take are an error,
+/// of which a reader that has gone is not told.
 int with_results_written(int code) {
   errno = 0;
   const bool whole = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
   if (whole) return code;
   const std::string reason = errno == 0 ? "" : ": " + std::generic_category().message(errno);
-  print_error("talus: error: the results could not be written to stdout{}\n", reason);
+  if (!reader_has_gone()) print_error("talus: error: the results could not be written to stdout{}\n", reason);
   return code == exit_done ? exit_failure : code;
 }
 

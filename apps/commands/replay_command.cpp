@@ -78,8 +78,10 @@ trace::Trace report(const ReplayOptions& options, const trace::Timeline& timelin
         fmt::format("{}   (replay {:+.1f} %)", seconds(recorded_time),
                     100 * (played.makespan / recorded_time - 1)));
   print("work of all tasks", seconds(played.work), label);
-  print("speedup over 1 x 1", fmt::format("{:.2f} of {:.0f}", alone / played.makespan, workers), label);
-  print("efficiency", percent(alone / (played.makespan * workers)), label);
+  print("speedup over 1 x 1",
+        fmt::format("{:.2f} of {:.0f}, {}", alone / played.makespan, workers,
+                    percent(alone / (played.makespan * workers))),
+        label);
   print("exposed messages", percent(summary.exposed / (played.makespan * workers)), label);
   print("waiting and idle", percent(summary.idle / (played.makespan * workers)), label);
   print("bound: longest chain", seconds(longest), label);

@@ -195,7 +195,8 @@ void add_study_certificate_options(CLI::App& app, StudyCertificateOptions& optio
       ->check(above_zero());
   app.add_option("--seed", options.seed, "seed of the first scene; the next one has the next seed")
       ->type_name("S")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(not_negative());
   app.add_option("--size", options.size, "grains of a made scene, over the usual number (up to some 150)")
       ->type_name("F")
       ->capture_default_str()

@@ -220,7 +220,8 @@ void add_study_error_options(CLI::App& app, StudyErrorOptions& options) {
       ->check(thread_count());
   app.add_option("--seeds", options.seeds, "seeds of the sample [the scene's]")
       ->type_name("S,..")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->check(not_negative());
   app.add_option("--only", options.only, "step: no whole runs; run: no single step")
       ->type_name("step|run")
       ->check(CLI::IsMember({"step", "run"}).description(""));

@@ -87,6 +87,10 @@ DirectoryLock prepare_output_directory(const fs::path& directory, bool force, Is
     if (fs::exists(directory) && !fs::is_directory(directory)) {
       throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
     }
+    if (!fs::exists(directory) && fs::is_symlink(directory))
+      throw FileError(directory.string(),
+                      "is a symbolic link that leads nowhere; make the folder it names, or give another name "
+                      "with --out");
     fs::create_directories(directory);
     DirectoryLock lock(directory);
     if (!fs::is_empty(directory)) {

@@ -46,6 +46,11 @@ TEST_F(Streams, ResultsThatStdoutDoesNotTakeAreAnError) {
   }
 }
 
+TEST_F(Streams, AReaderThatHasGoneIsNotTold) {
+  EXPECT_EQ(shell("exec 3> >(exec true); wait $!; talus scene-reference >&3 2>messages"), 1);
+  EXPECT_EQ(content(at("messages")), "");
+}
+
 TEST_F(Streams, MessagesThatStderrDoesNotTakeEndNothing) {
   write(at("scene.toml"), column_scene);
   int number = 0;
@@ -60,6 +65,16 @@ TEST_F(Streams, MessagesThatStderrDoesNotTakeEndNothing) {
                                       "trace export --format svg", "replay", "study error", "study scaling"})
       EXPECT_EQ(shell("talus " + command + " nothing.toml " + messages), 2) << command << " " << messages;
     EXPECT_EQ(shell("talus run scene.toml --dry-run " + messages + " >/dev/null"), 0) << messages;
+  }
+}
+
+TEST_F(Streams, ANegativeSeedIsNamedAsItWasGiven) {
+  write(at("scene.toml"), column_scene);
+  for (const std::string command : {"study error scene.toml --seeds=-1", "study certificate --seed=-1"}) {
+    EXPECT_EQ(shell("talus " + command + " 2>messages"), 2) << command;
+    const std::string said = content(at("messages"));
+    EXPECT_NE(said.find("--seed"), std::string::npos) << said;
+    EXPECT_NE(said.find("got -1"), std::string::npos) << said;
   }
 }
 

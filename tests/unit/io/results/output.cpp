@@ -88,6 +88,13 @@ TEST(OutputDirectory, ForceWritesThroughNoLink) {
   }
 }
 
+TEST(OutputDirectory, ALinkThatLeadsNowhereIsNamed) {
+  const ScratchDirectory scratch;
+  fs::create_symlink("nowhere", scratch / "run");
+  const std::string message = message_of<FileError>([&] { prepare(scratch / "run", true); });
+  EXPECT_NE(message.find("run: is a symbolic link that leads nowhere"), std::string::npos) << message;
+}
+
 TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
   const ScratchDirectory scratch, elsewhere;
   touch(elsewhere / "grains_000000.vtp");
