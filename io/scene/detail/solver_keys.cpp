@@ -27,7 +27,8 @@ Section<DetectionSettings> detection_keys() {
 Section<SolverSettings> solver_keys() {
   return {
       "[solver]",
-      "When a step counts as solved, and how hard to try.",
+      "When a step counts as solved, and how hard to try. Clumps and rolling resistance go with "
+      "neither `nlgs+momentum` nor `nncg`, a cell that follows a stress with no `overlap_correction`.",
       {
           choice<SolverSettings>("method", methods(), &SolverSettings::method),
           key<SolverSettings>("tolerance", "", positive,
@@ -121,7 +122,9 @@ Section<DecompositionSettings> decomposition_keys() {
   const auto in_boxes = [](const D& d) { return cuts_boxes(d.partitioner); };
   return {
       "[decomposition]",
-      "How the sample is cut into subdomains, and how these act on one another.",
+      "How the sample is cut into subdomains, and how these act on one another. `schwarz` goes with neither "
+      "clumps, rolling resistance, `nlgs+momentum` nor `overlap_correction`; a cell that follows a stress "
+      "is coupled by `nscdd`.",
       {
           key<D>("subdomains", "", {.low = 1, .high = most_subdomains},
                  "Number of subdomains, at least one per rank.", &D::subdomains)
