@@ -108,6 +108,7 @@ struct CellMotion {
   double mass = 0;                                       ///< [kg]; 0: there is none
   Vec3 stretches = Vec3::Zero(), shears = Vec3::Zero();  ///< 1 for the components that move
   double edge = 0;                                       ///< of the cell over d
+  double driven = 0;  ///< fastest component of its flow that follows no stress [1/s]
 };
 
 /// The arrays of a step from which the problem is gathered.

@@ -95,12 +95,15 @@ std::array<std::int32_t, 2> StepReader::pair_at(std::size_t chunk, std::size_t p
 }
 
 /// The speed at which the flow of a cell moves two touching bodies against one another [m/s]: that of the
-/// image's drift, scaled from the distance of the image to theirs.
+/// image's drift, scaled from the distance of the image to theirs. In a cell that follows a stress most of
+/// the drift is what the stress would do without contacts, and drives nothing, as the load of a pushed wall:
+/// there only what is prescribed counts.
 double StepReader::drive_of_flow(const ContactEquation& contact, const Vec3& drift) const {
   if (drift == Vec3::Zero()) return 0;
   const std::size_t a = begin_ + at(contact.first), b = begin_ + at(contact.second);
-  const double near = source_.radius[a] + source_.radius[b],
-               far = (source_.x[a] - source_.x[b] - near * contact.normal).norm();
+  const double near = source_.radius[a] + source_.radius[b];
+  if (has_cell()) return near * source_.cell.driven;
+  const double far = (source_.x[a] - source_.x[b] - near * contact.normal).norm();
   return far > 0 ? drift.norm() * near / far : 0;
 }
 

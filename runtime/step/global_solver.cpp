@@ -56,13 +56,14 @@ std::vector<WallMotion> motions_of(const StepState& state) {
   return walls;
 }
 
-CellMotion motion_of(const StressedCell& cell, const Domain& domain) {
+CellMotion motion_of(const StressedCell& cell, const Domain& domain, const Mat3& prescribed) {
   if (!cell.loaded()) return {};
   const auto moves = [&](std::size_t k) { return cell.follows[k] ? 1.0 : 0.0; };
   return {cell.mass,
           {moves(0), moves(1), moves(2)},
           {moves(3), moves(4), moves(5)},
-          domain.mean_edge() / cell.length};
+          domain.mean_edge() / cell.length,
+          prescribed.cwiseAbs().maxCoeff()};
 }
 
 BodyProblemSource source_of(const StepState& state, const StepParameters& parameters,
@@ -76,7 +77,7 @@ BodyProblemSource source_of(const StepState& state, const StepParameters& parame
           state.contacts,
           parameters.laws,
           state.decomposition.parts,
-          motion_of(state.cell, state.domain)};
+          motion_of(state.cell, state.domain, parameters.velocity_gradient)};
 }
 
 /// Contacts do something besides r: BodyProblem::known.
