@@ -17,7 +17,8 @@ struct Floors {
   double contact = 1e-3;   ///< likewise: least contact impulse
   double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
   double cluster = 1e-3;   ///< of a cluster's own momentum, likewise: grains that graze one another
-  double rounding = 5;     ///< speeds that rounding of a position makes: a row adds up those of its grains
+  double rounding = 5;     ///< speeds that rounding of a position makes
+  double row = 10;         ///< grains of a cluster beyond which their speeds add up to more
 };
 constexpr Floors floors;
 
@@ -55,17 +56,36 @@ struct Momenta {
   double all_exchanged() const { return std::accumulate(exchanged.begin(), exchanged.end(), 0.0); }
 };
 
-/// What is left of an error beyond what rounding of positions makes of it.
-double beyond_rounding(const StepProblem& problem, double mass, double error) {
-  return std::max(0.0, error - floors.rounding * mass * problem.rounding_speed);
+/// What is left of an error beyond what rounding of positions makes of it, so many times over.
+double beyond_rounding(const StepProblem& problem, double mass, double error, double times) {
+  return std::max(0.0, error - times * mass * problem.rounding_speed);
+}
+
+/// Per grain: how many speeds that rounding makes its own may be off by. A row adds up those of its grains,
+/// of either sign.
+std::vector<double> roundings(const StepProblem& problem) {
+  std::size_t count = 0;
+  const std::vector<std::size_t> cluster = clusters_of(problem, count);
+  std::vector<std::size_t> of_grain(problem.mass.size(), count);
+  for (std::size_t c = 0; c < cluster.size(); ++c) {
+    of_grain[problem.contacts[c].first] = cluster[c];
+    if (!problem.contacts[c].at_wall()) of_grain[problem.contacts[c].other()] = cluster[c];
+  }
+  std::vector<double> grains(count + 1, 0.0), times;
+  for (const std::size_t k : of_grain) ++grains[k];
+  grains[count] = 0;  // those that touch nothing
+  for (const std::size_t k : of_grain)
+    times.push_back(floors.rounding * std::max(1.0, std::sqrt(grains[k] / floors.row)));
+  return times;
 }
 
 Momenta momenta(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   Momenta found;
   const Motion &exact = reference.motion, &free = problem.free;
+  const std::vector<double> times = roundings(problem);
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    found.wrong.push_back(
-        beyond_rounding(problem, problem.mass[k], problem.mass[k] * (end.after.u[k] - exact.u[k]).norm()));
+    found.wrong.push_back(beyond_rounding(problem, problem.mass[k],
+                                          problem.mass[k] * (end.after.u[k] - exact.u[k]).norm(), times[k]));
     found.exchanged.push_back(problem.mass[k] * (exact.u[k] - free.u[k]).norm());
   }
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
@@ -165,7 +185,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     contact_unit = std::max(contact_unit, reference.r[c].norm());
     contact_wrong =
-        std::max(contact_wrong, beyond_rounding(problem, together[c], (reference.r[c] - end.r[c]).norm()));
+        std::max(contact_wrong,
+                 beyond_rounding(problem, together[c], (reference.r[c] - end.r[c]).norm(), floors.rounding));
   }
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);
@@ -198,17 +219,18 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
     if (problem.wall_inv_mass[w] > 0) return 0;
   if (problem.drive_speed > 0 || problem.cell.repeats) return 0;
   double gained = 0, free = 0, fall = 0;
+  const double h = problem.time_step * (1 + problem.reflection);
   const auto spin = [](const Frame& frame, std::size_t k) {
     return frame.omega.empty() ? 0.0 : (frame.radius[k] * frame.omega[k]).squaredNorm();
   };
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
     const double m = problem.mass[k], inertia = 0.4 * m;
     // Not from positions: those that `overlap_correction` shifts do not fall or rise by their motion.
-    const Vec3 moved = problem.time_step / 2 * (before.u[k] + after.u[k]);
+    const Vec3 moved = h / 2 * (before.u[k] + after.u[k]);
     gained += 0.5 * m * (after.u[k].squaredNorm() - before.u[k].squaredNorm()) -
               m * problem.gravity.dot(moved) + 0.5 * inertia * (spin(after, k) - spin(before, k));
     free += 0.5 * m * problem.free.u[k].squaredNorm() + 0.5 * inertia * spin(before, k);
-    fall += m * (problem.time_step * problem.gravity).squaredNorm() / 8;
+    fall += m * (h * problem.gravity).squaredNorm() / 8;
   }
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;
 }
