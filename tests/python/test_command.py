@@ -78,6 +78,48 @@ def test_results_are_not_overwritten(heap_run, heap):
         talus.run(heap, heap_run.directory, progress=False)
 
 
+def test_a_scene_of_the_users_own_is_never_written_over(heap, tmp_path):
+    own = tmp_path / "dam.toml"
+    own.write_text("# mine\n" + talus.Scene(heap).to_toml())
+    before = own.read_text()
+    scene = talus.Scene.load(own)
+    scene["material.friction"] = 0.2
+    for options in ({}, {"force": True}, {"resume": True}):
+        with pytest.raises(FileExistsError, match="no scene that talus.run wrote"):
+            talus.run(scene, tmp_path / "dam", progress=False, **options)
+        assert own.read_text() == before
+
+
+def test_a_scene_that_the_program_refuses_blocks_no_better_one(heap, tmp_path):
+    out = tmp_path / "run"
+    with pytest.raises(talus.RunError, match="frictoin"):
+        talus.run(heap, out, settings={"material.frictoin": 0.3}, threads=1, progress=False)
+    assert not list(tmp_path.iterdir())
+    talus.run(heap, out, settings={"material.friction": 0.3}, threads=1, progress=False)
+    kept = (tmp_path / "run.toml").read_text()
+    with pytest.raises(FileExistsError, match="force=True begins anew"):
+        talus.run(heap, out, progress=False)
+    with pytest.raises(talus.RunError):
+        talus.run(heap, out, settings={"material.frictoin": 0.3}, force=True, progress=False)
+    assert (tmp_path / "run.toml").read_text() == kept
+    longer = talus.Scene.load(tmp_path / "run.toml")
+    longer["stage.rest.end.steps"] = 40
+    assert talus.run(longer, out, resume=True, threads=1, progress=False).summary["steps"] == 40
+    assert talus.run(heap, out, force=True, threads=1, progress=False).summary["steps"] == 30
+
+
+def test_arguments_of_another_kind_are_named(heap, tmp_path):
+    with pytest.raises(ValueError, match="ranks must be 1 or more, got 0"):
+        talus.run(heap, tmp_path / "run", ranks=0)
+    with pytest.raises(TypeError, match="'--steps', '2'"):
+        talus.run(heap, tmp_path / "run", options="--steps 2")
+    with pytest.raises(TypeError, match="friction: give a list of values"):
+        talus.sweep(heap, tmp_path / "sweep", friction=0.3)
+    with pytest.raises(talus.SceneError, match="is a folder"):
+        talus.Scene.load(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
 def test_missed_steps_are_a_flag(heap, tmp_path):
     run = talus.run(heap, tmp_path / "missed", threads=1, progress=False,
                     settings={"solver": {"method": "nlgs", "max_iterations": 1}})

@@ -166,6 +166,21 @@ def test_a_damaged_file_is_named(heap_run, tmp_path, content):
         talus.open(other).scene
 
 
+@pytest.mark.parametrize("name, content", [("results.h5", b""), ("results.h5", b"no HDF5"), ("steps.csv", b"\xff\n1\n"),
+                                           ("steps.csv", b"step,time\n1\n"), ("steps.csv", b"step,time\n1,2\n")])
+def test_a_damaged_table_or_file_of_frames_is_named(heap_run, tmp_path, name, content):
+    other = tmp_path / "run"
+    shutil.copytree(heap_run.directory, other)
+    (other / name).write_bytes(content)
+    with pytest.raises(talus.DamagedFile, match=f"run/{name}: "):
+        talus.open(other).frame(0).positions if name == "results.h5" else talus.open(other).missed
+
+
+def test_frames_are_read_while_h5py_has_the_file_open(heap_run):
+    with h5py.File(heap_run.directory / "results.h5") as file:
+        assert len(talus.open(heap_run.directory).frame(0).positions) == len(file["frames/000000/bodies/x"])
+
+
 def test_other_formats_are_refused(heap_run, tmp_path):
     other = tmp_path / "run"
     shutil.copytree(heap_run.directory, other)

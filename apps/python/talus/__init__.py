@@ -14,9 +14,10 @@
 """
 
 from .command import RunError, Stopped, find_program, run
-from .frame import Frame, MissingData
+from .errors import DamagedFile, MissingData, NotARun
+from .frame import Frame
 from .parameter_sweep import Sweep, sweep
-from .results import DamagedFile, NotARun, Run, open_run
+from .results import Run, open_run
 from .scene import Scene, SceneError
 from .statistics import anisotropy, displacements, fabric_tensor, force_distribution, pair_correlation
 from .tables import read_table

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 DONE, FAILED, BAD_INPUT, TOLERANCE_MISSED, STOPPED = 0, 1, 2, 3, 75
 POLL = 0.2  # [s] between looks at a run that goes on
 
+# First line of the scenes that `run` writes: others are the user's own, and stay.
+MARK = "# Written by talus.run, which may write it anew.\n"
+
 Progress = Callable[[dict[str, Any]], None]
 
 
@@ -82,7 +85,9 @@ def run(
 ) -> results.Run:
     """Runs a scene to its end and returns the run. Steps that missed their tolerance are no error: see `Run.missed`.
 
-    scene: a `Scene`, a dict or the path of a scene file. A dict is written beside the results as OUT.toml.
+    scene: a `Scene`, a dict or the path of a scene file. All but a file without `settings` is written beside the results
+    as OUT.toml. What stands there is written over with `force` or `resume` only, and only where this function wrote it;
+    it stays where the program finds the scene wrong.
     out: directory of the results, by default out/NAME. Results that are there are refused without `force` or `resume`.
     ranks, threads: MPI ranks (by mpirun) and threads of each; all cores where nothing is said.
     settings: keys that differ from the scene, {"material.friction": 0.5}.
@@ -90,10 +95,17 @@ def run(
     progress: True writes a line to stderr; a function is called with what status.json has, about twice a second.
 
     Raises Stopped (exit code 75) where the run was stopped behind a checkpoint, RunError with the program's message
-    where it failed (1) or the scene or an option is wrong (2). An interrupt (Ctrl-C) stops the run behind a checkpoint.
+    where it failed (1) or the scene or an option is wrong (2), FileExistsError where OUT.toml holds another scene. An
+    interrupt (Ctrl-C) stops the run behind a checkpoint.
     """
     from .scene import Scene
 
+    if ranks < 1:
+        raise ValueError(f"ranks must be 1 or more, got {ranks}")
+    if isinstance(options, str):
+        raise TypeError(f"options are a list of words, [{', '.join(repr(word) for word in options.split())}], not one text")
+    talus = find_program(program)
+    written: _SceneFile | None = None
     if isinstance(scene, (str, os.PathLike)) and not settings:
         path, name = Path(scene), Path(scene).stem
         directory = Path(out) if out is not None else Path("out") / Scene.load(path).name
@@ -104,11 +116,10 @@ def run(
             changed[key] = value
         name = changed.name
         directory = Path(out) if out is not None else Path("out") / name
-        path = directory.parent / f"{directory.name}.toml"
-        if force:
-            path.unlink(missing_ok=True)
-        changed.write(path)
-    words = [find_program(program), "run", str(path), "--out", str(directory)]
+        written = _SceneFile(changed, directory)
+        path = written.path
+        written.put(replace=force or resume)
+    words = [talus, "run", str(path), "--out", str(directory)]
     if ranks > 1:
         words = ["mpirun", "-n", str(ranks), *words]
     if threads is not None:
@@ -117,7 +128,50 @@ def run(
     exit_code, stderr = _follow(words, directory, _reporter(progress, name))
     if exit_code in (DONE, TOLERANCE_MISSED):
         return results.Run(directory)
+    if exit_code == BAD_INPUT and written is not None:
+        written.take_back()
     raise (Stopped if exit_code == STOPPED else RunError)(message_of(stderr), exit_code, directory)
+
+
+class _SceneFile:
+    """OUT.toml, the scene of a run beside its results OUT."""
+
+    def __init__(self, scene: Scene, directory: Path) -> None:
+        self.path = directory.parent / f"{directory.name}.toml"
+        self.text = MARK + scene.toml_for(self.path.parent)
+        self.former = self.path.read_text(encoding="utf-8", errors="replace") if self.path.exists() else None
+
+    def holds_another(self) -> bool:
+        return self.former is not None and self.former not in (self.text, self.text.removeprefix(MARK))
+
+    def put(self, replace: bool) -> None:
+        """Raises FileExistsError where there is another scene that must stay."""
+        if self.holds_another() and not (self.former or "").startswith(MARK):
+            raise FileExistsError(f"{self.path}: exists, and is no scene that talus.run wrote, which would be written there; "
+                                  "choose another directory of results")
+        if self.holds_another() and not replace:
+            raise FileExistsError(f"{self.path}: exists and holds another scene; force=True begins anew, resume=True goes on "
+                                  "with the changed scene, or choose another directory")
+        if self.former is None or self.holds_another():
+            self._write(self.text)
+
+    def take_back(self) -> None:
+        """What was there before `put`."""
+        if self.former is None:
+            self.path.unlink(missing_ok=True)
+        elif self.holds_another():
+            self._write(self.former)
+
+    def _write(self, text: str) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        part = self.path.with_name(self.path.name + ".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(self.path)
+
+
+def holds_another_scene(scene: Scene, directory: Path) -> bool:
+    """The scene beside the results in `directory` is there, and is not what `run` would write."""
+    return _SceneFile(scene, directory).holds_another()
 
 
 def _follow(words: list[str], directory: Path, report: Progress) -> tuple[int, str]:

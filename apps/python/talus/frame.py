@@ -10,20 +10,14 @@ from typing import Callable, TypeVar
 import h5py
 import numpy as np
 
+from .errors import MENDS, DamagedFile, MissingData, NotThere
+
 T = TypeVar("T")
 
 FORMAT, FORMAT_VERSION = "talus-results", 1
 # The program writes a frame within milliseconds, and names it when it is whole. A reader that looks in between may
 # meet a directory of the file that changes; it looks again.
 RETRIES, RETRY_WAIT = 20, 0.05  # [1], [s]
-
-
-class MissingData(LookupError):
-    """A frame or an array that the run has not written; the message says which key of the scene writes it."""
-
-
-class NotThere(KeyError):
-    """What a directory of the file should have and has not: at this moment, or for good."""
 
 
 def text(value: object) -> str:
@@ -34,11 +28,13 @@ def text(value: object) -> str:
 def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
     """What `read` returns of a results.h5 that may be written at this moment.
 
-    Raises MissingData where there is no file, ValueError where it is of another format.
+    Raises MissingData where there is no file, DamagedFile where it cannot be read, ValueError where it is of another
+    format.
     """
+    locking: bool | None = False
     for attempt in range(RETRIES):
         try:
-            with h5py.File(path, "r", locking=False) as file:
+            with h5py.File(path, "r", locking=locking) as file:
                 kind, version = text(file.attrs.get("format", "")), int(file.attrs.get("format_version", 0))
                 if kind != FORMAT:
                     raise ValueError(f"{path}: no results of Talus (its attribute 'format' is '{kind}')")
@@ -54,8 +50,10 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
             if attempt + 1 == RETRIES and isinstance(error, NotThere):
                 raise MissingData(error.args[0]) from None
             if attempt + 1 == RETRIES:
-                raise OSError(f"{path}: cannot be read: {error}; where a run was killed, `talus run ... --resume` "
-                              "mends the file") from error
+                raise DamagedFile(f"{path}: is damaged: {error}; {MENDS}") from error
+            if "locking flag" in str(error):  # the caller has it open, as h5py opens files by itself
+                locking = None
+                continue
             clock.sleep(RETRY_WAIT)
     raise AssertionError("unreachable")
 

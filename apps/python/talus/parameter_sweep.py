@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .command import RunError, run
+from .command import RunError, holds_another_scene, run
 from .results import Run
 from .scene import Scene, SceneError
 
@@ -102,6 +102,9 @@ def sweep(
     """
     base = scene.copy() if isinstance(scene, Scene) else \
         Scene.load(scene) if isinstance(scene, (str, os.PathLike)) else Scene(scene)
+    for key, given in {**(keys or {}), **named}.items():
+        if isinstance(given, str) or not isinstance(given, Iterable):
+            raise TypeError(f"{key}: give a list of values, [{given!r}]")
     values = {**(keys or {}), **_full_names(base, named, program)}
     points = list(itertools.product(*values.values()))
     if not values or not points:
@@ -118,6 +121,11 @@ def sweep(
     there = [directory for directory in directories if (directory / "run.json").exists()]
     if there and not (resume or force):
         raise FileExistsError(f"{there[0]} holds a run: resume=True keeps what is done, force=True runs all anew")
+
+    others = [directory for changed, directory in zip(scenes, directories) if holds_another_scene(changed, directory)]
+    if others and not force:
+        raise FileExistsError(f"{others[0]}: its run is of another scene; force=True runs all anew, or choose another "
+                              "directory")
 
     def one(changed: Scene, directory: Path) -> RunError | None:
         try:

@@ -11,16 +11,9 @@ from typing import Any, overload
 import h5py
 import numpy as np
 
-from .frame import Frame, MissingData, NotThere, read_file, text
+from .errors import MENDS, DamagedFile, MissingData, NotARun, NotThere
+from .frame import Frame, read_file, text
 from .tables import read_table
-
-
-class NotARun(ValueError):
-    """A directory that no run of Talus was begun in."""
-
-
-class DamagedFile(ValueError):
-    """A file of a run that does not hold what the program writes into it; the message names it."""
 
 
 def open_run(directory: str | os.PathLike[str]) -> Run:
@@ -83,6 +76,8 @@ class Run:
     def missed(self) -> int:
         """Steps so far that missed their tolerance or overlapped beyond it; 0: every step carries its certificate."""
         steps = self.steps
+        if "converged" not in (steps.dtype.names or ()):
+            raise DamagedFile(f"{self.directory / 'steps.csv'}: has no column `converged`; {MENDS}")
         return int(np.count_nonzero(~steps["converged"])) if len(steps) else 0
 
     @property
@@ -197,8 +192,7 @@ def _parsed(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
     try:
         content = parse(path.read_text(encoding="utf-8"))
     except ValueError as error:  # also what is no UTF-8
-        raise DamagedFile(f"{path}: is damaged: {error}; `talus run ... --resume` writes it anew from a checkpoint, where "
-                          "there is one") from error
+        raise DamagedFile(f"{path}: is damaged: {error}; {MENDS}") from error
     if not isinstance(content, dict):
         raise DamagedFile(f"{path}: is damaged: it holds no table of names and values")
     return content

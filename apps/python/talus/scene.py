@@ -36,11 +36,13 @@ class Scene(MutableMapping[str, Any]):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Scene:
-        """The scene of a TOML file. Raises SceneError where the file is no TOML."""
+        """The scene of a TOML file. Raises SceneError where the file is no TOML, or a folder."""
         path = Path(path)
+        if path.is_dir():
+            raise SceneError(f"{path}: is a folder; give a scene file in it")
         try:
             keys = tomllib.loads(path.read_text(encoding="utf-8"))
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise SceneError(f"{path}: {error}") from None
         return cls(keys, path.parent, path.stem)
 
@@ -96,13 +98,17 @@ class Scene(MutableMapping[str, Any]):
         """The scene as TOML, paths in it as they are."""
         return toml_text(self._keys)
 
+    def toml_for(self, folder: str | os.PathLike[str]) -> str:
+        """The scene as TOML of a file in `folder`: relative paths in it are changed to begin there."""
+        return toml_text(_moved(self._keys, self.folder, Path(folder)))
+
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the scene to a new file; relative paths in it are changed to begin at its folder.
 
         Raises FileExistsError where the file is there and holds something else.
         """
         path = Path(path)
-        written = toml_text(_moved(self._keys, self.folder, path.parent))
+        written = self.toml_for(path.parent)
         if path.exists():
             if path.read_text(encoding="utf-8") == written:
                 return

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .frame import Frame, MissingData
+from .errors import MissingData
+from .frame import Frame
 
 
 def fabric_tensor(normals: ArrayLike) -> np.ndarray:
@@ -48,7 +49,9 @@ def force_distribution(forces: ArrayLike, bins: int | ArrayLike = 40) -> tuple[n
     if len(f) == 0:
         raise ValueError("no contact carries a force")
     f = f / f.mean()
-    edges = np.linspace(0, f.max(), bins + 1) if isinstance(bins, int) else np.asarray(bins, dtype=float)
+    if np.ndim(bins) == 0 and bins < 1:
+        raise ValueError(f"bins must be 1 or more, got {bins}")
+    edges = np.linspace(0, f.max(), bins + 1) if np.ndim(bins) == 0 else np.asarray(bins, dtype=float)
     counts, edges = np.histogram(f, edges)
     return 0.5 * (edges[1:] + edges[:-1]), counts / (max(counts.sum(), 1) * np.diff(edges))
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import MENDS, DamagedFile
+
 # Columns that hold whole numbers. Types do not follow from the values: a velocity may be "0" in every row.
 INTEGERS = frozenset({
     "step", "candidates", "contacts", "active", "iterations", "worst_contact_body", "worst_contact_with", "worst_body",
@@ -24,20 +26,23 @@ def read_table(path: str | os.PathLike[str]) -> np.ndarray:
     Counters are int64, `converged` is bool, names are str, everything else float64. A last line without its end, of a
     run that goes on or was killed, is left out. Units: docs/formats.md, and `Run.units`.
 
-    Raises FileNotFoundError, and ValueError naming the file for a table with rows of unequal length.
+    Raises FileNotFoundError, and DamagedFile naming the file where it is no such table.
     """
     path = Path(path)
-    with path.open(encoding="utf-8", newline="") as file:
-        text = file.read()
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            text = file.read()
+    except UnicodeDecodeError as error:
+        raise DamagedFile(f"{path}: is damaged: {error}; {MENDS}") from error
     text = text[: text.rfind("\n") + 1]
     header, _, body = text.partition("\n")
     names = next(csv.reader([header]), [])
     if not names:
-        raise ValueError(f"{path}: no header line; the table is empty or of another program")
+        raise DamagedFile(f"{path}: no header line; the table is empty or of another program")
     rows = [row for row in csv.reader(io.StringIO(body)) if row]
     for number, row in enumerate(rows, start=2):
         if len(row) != len(names):
-            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(names)}")
+            raise DamagedFile(f"{path}: row {number} has {len(row)} cells, the header {len(names)}")
     columns = [_column(name, [row[k] for row in rows]) for k, name in enumerate(names)]
     table = np.empty(len(rows), dtype=[(name, column.dtype) for name, column in zip(names, columns)])
     for name, column in zip(names, columns):
