@@ -306,6 +306,9 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     else if (ranks.rank() == 0)
       terminal.say("the run in {} is done; to go on beyond its end, give its stage another one with --set",
                    run.directory);
+    if (ranks.rank() == 0)
+      if (const std::string fault = fault_of_results(run.directory, run.scene.output); !fault.empty())
+        terminal.warn("warning: {}; the run is done, and does not write it again", fault);
     // Who killed the run while the page was drawn gets it now.
     std::error_code unknown;
     if (ranks.rank() == 0 && !std::filesystem::exists(run.directory + "/report.html", unknown))

@@ -162,6 +162,19 @@ void demand_files_of_run(const std::filesystem::path& directory, const io::Outpu
   if (mends) io::demand_kept_frames(directory / results, mark.frame_times.size());
 }
 
+std::string fault_of_results(const std::filesystem::path& directory, const io::OutputSpec& output) {
+  const std::filesystem::path results = directory / "results.h5";
+  std::error_code unknown;
+  if (!goes_on(results.filename().string(), output)) return "";
+  if (!std::filesystem::exists(results, unknown)) return results.string() + ": is missing";
+  try {
+    io::frame_count(results.string());
+    return "";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
 void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
   const std::filesystem::path resolved = directory / resolved_text, run_json = directory / "run.json";
   std::error_code unknown;

@@ -40,6 +40,9 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
 void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
                          const io::OutputMark& mark, bool mends);
 
+/// Why nobody can read the frames of a run that is done, "" where they can be read or it writes none.
+std::string fault_of_results(const std::filesystem::path& directory, const io::OutputSpec& output);
+
 /// Of a directory without a checkpoint: throws std::invalid_argument unless the results in it, if there are
 /// any, are those of this scene, whose walls have been placed. Of a run that is done nothing may differ, of
 /// another one what a checkpoint would let change.
