@@ -217,7 +217,8 @@ std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& s
   const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps,
              sweeps_done = summary.worst_error_rms <= solver.tolerance;
   std::string remedy = "Raise solver.max_iterations, reduce time_step";
-  if (sweeps_done) remedy = "Every error_rms is within its tolerance: raise solver.max_iterations, or reduce time_step";
+  if (sweeps_done)
+    remedy = "Every error_rms is within its tolerance: raise solver.max_iterations, or reduce time_step";
   if (overlaps_alone) remedy = "Reduce time_step";
   if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
   return remedy;

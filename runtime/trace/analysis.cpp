@@ -187,8 +187,8 @@ std::string describe(const Summary& sum) {
        percent(sum.exposed, all));
   line("  {:<26}{:6.1f} %   (most work of a rank over the mean)", "load imbalance", 100 * sum.imbalance);
   const Efficiencies& e = sum.efficiency;
-  line("\nparallel efficiency {:.3f} = load balance {:.3f} x communication {:.3f} x threads {:.3f}", e.parallel,
-       e.load_balance, e.communication, e.threads);
+  line("\nparallel efficiency {:.3f} = load balance {:.3f} x communication {:.3f} x threads {:.3f}",
+       e.parallel, e.load_balance, e.communication, e.threads);
   line("\ncritical path, {}", time_of(sum.path_time));
   constexpr std::size_t most_lines = 12;
   for (std::size_t k = 0; k < std::min(most_lines, sum.path.size()); ++k)

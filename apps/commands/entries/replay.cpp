@@ -46,7 +46,9 @@ void add_options(CLI::App& app, ReplayOptions& options) {
       ->capture_default_str();
   app.add_option("--noise", options.machine.noise, "each task takes up to this part longer")
       ->capture_default_str();
-  app.add_option("--seed", options.machine.seed, "of the noise")->capture_default_str()->check(not_negative());
+  app.add_option("--seed", options.machine.seed, "of the noise")
+      ->capture_default_str()
+      ->check(not_negative());
   app.add_option("--speed", options.machine.speed, "of a core, relative to the recorded one")
       ->capture_default_str();
   app.add_option_function<std::vector<std::string>>(
