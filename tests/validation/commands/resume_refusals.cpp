@@ -248,6 +248,20 @@ TEST_F(ResumeRefusals, OfARunThatIsDoneGiveItThePageThatItLacks) {
   EXPECT_TRUE(fs::exists(at("out/report.html")));
 }
 
+TEST_F(ResumeRefusals, AreNoneOfADoneRunWhoseFramesAreLostButItAndItsPageSaySo) {
+  const std::string line = "run scene.toml --out out --threads 1 --resume";
+  ASSERT_EQ(run(line).code, 0);
+  EXPECT_EQ(run(line).messages.find("results.h5"), std::string::npos);
+  fs::resize_file(at("out/results.h5"), 3000);
+  const Outcome cut = run(line);
+  EXPECT_EQ(cut.code, 0);
+  EXPECT_NE(cut.messages.find("out/results.h5: opening as HDF5 failed"), std::string::npos) << cut.messages;
+  EXPECT_EQ(run("report out").code, 0);
+  EXPECT_NE(content(at("out/report.html")).find("No picture: "), std::string::npos);
+  fs::remove(at("out/results.h5"));
+  EXPECT_NE(run(line).messages.find("out/results.h5: is missing"), std::string::npos);
+}
+
 TEST_F(ResumeRefusals, OfCheckpointsThatAreAllDamaged) {
   const std::string line = "run scene.toml --out out --threads 1 --resume";
   ASSERT_EQ(run(line + " --steps 3").code, 0);
