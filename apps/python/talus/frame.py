@@ -50,7 +50,7 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
             if attempt + 1 == RETRIES and isinstance(error, NotThere):
                 raise MissingData(error.args[0]) from None
             if attempt + 1 == RETRIES:
-                raise DamagedFile(f"{path}: is damaged: {error}; {MENDS}") from error
+                raise DamagedFile(f"{path}: cannot be read: {error}; {MENDS}") from error
             if "locking flag" in str(error):  # the caller has it open, as h5py opens files by itself
                 locking = None
                 continue
