@@ -267,7 +267,7 @@ radius_min = 0.0009       # m
 radius_max = 0.0011
 
 # Without friction grains come closer before they jam. A strain of 0.19 along each axis raises the solid
-# fraction by exp(3 x 0.19), from 0.31 to 0.55: with friction grains jam at some 0.58.
+# fraction by a factor of exp(3 x 0.19), from 0.31 to 0.55: with friction grains jam at some 0.58.
 [[stage]]
 name = "squeeze"
 friction = 0

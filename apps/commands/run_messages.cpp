@@ -213,12 +213,9 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
 }
 
 /// Overlaps are a matter of the time step alone.
-std::string remedy_of_misses(const io::Summary& summary, const SolverSettings& solver) {
-  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps,
-             sweeps_done = summary.worst_error_rms <= solver.tolerance;
+std::string remedy_of_misses(const io::Summary& summary) {
+  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
   std::string remedy = "Raise solver.max_iterations, reduce time_step";
-  if (sweeps_done)
-    remedy = "Every error_rms is within its tolerance: raise solver.max_iterations, or reduce time_step";
   if (overlaps_alone) remedy = "Reduce time_step";
   if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
   return remedy;
@@ -245,7 +242,7 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         "which. {}",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
         summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance,
-        remedy_of_misses(summary, solver));
+        remedy_of_misses(summary));
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/report/run_folder.hpp"
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "io/files/crc.hpp"
 #include "io/files/output_directory.hpp"
@@ -167,12 +168,7 @@ std::string fault_of_results(const std::filesystem::path& directory, const io::O
   std::error_code unknown;
   if (!goes_on(results.filename().string(), output)) return "";
   if (!std::filesystem::exists(results, unknown)) return results.string() + ": is missing";
-  try {
-    io::frame_count(results.string());
-    return "";
-  } catch (const std::exception& error) {
-    return error.what();
-  }
+  return damage_of_frames(directory);
 }
 
 void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {

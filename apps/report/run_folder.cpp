@@ -29,6 +29,16 @@ std::string resolved_text(const std::filesystem::path& directory) {
 
 }  // namespace
 
+std::string damage_of_frames(const std::filesystem::path& directory) {
+  const std::filesystem::path results = directory / "results.h5";
+  try {
+    if (std::filesystem::exists(results)) io::frame_count(results.string());
+    return "";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
 std::optional<io::Scene> resolved_scene(const std::filesystem::path& directory) {
   try {
     return io::parse_scene(resolved_text(directory), (directory / "scene.resolved.toml").string());

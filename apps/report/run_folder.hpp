@@ -25,6 +25,9 @@ struct RunFolder {
 /// The files of a run that pictures, pages and other formats are made from, which none of them may replace.
 std::vector<std::filesystem::path> sources_in(const std::filesystem::path& directory);
 
+/// Why the frames of results.h5 in a directory cannot be listed; "" where they can, or there is no such file.
+std::string damage_of_frames(const std::filesystem::path& directory);
+
 /// What scene.resolved.toml holds; none where it is not there, cannot be read, or the files that it names are
 /// gone.
 std::optional<io::Scene> resolved_scene(const std::filesystem::path& directory);

@@ -25,20 +25,6 @@ constexpr std::size_t most_live = 20000;     ///< spheres that a browser turns s
 constexpr std::size_t most_drawn = 1000000;  ///< that a report draws by itself
 constexpr std::size_t most_bends = 5000;     ///< of a wall: a finer mesh has no outline in the live view
 
-/// What keeps results.h5 of a run that has ended from being read; "" where nothing does.
-std::string damage_of_results(const RunFolder& run) {
-  const std::filesystem::path results = run.directory / "results.h5";
-  const auto status = run.summary.find("status");
-  const bool ended = status != run.summary.end() && *status != "running";
-  if (!ended || !std::filesystem::exists(results)) return "";
-  try {
-    io::frame_count(results);
-    return "";
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-}
-
 /// The newest frame; none where there is none, or it lacks what a view needs.
 std::optional<Frame> last_frame(const RunFolder& run) {
   try {
@@ -162,8 +148,10 @@ std::string live_view(const json& data) {
 }  // namespace
 
 HtmlSections view_section(const RunFolder& run) {
-  const std::string damage = damage_of_results(run);
-  if (!damage.empty()) return {{"The sample", "No picture: " + damage + "."}};
+  const auto status = run.summary.find("status");
+  const bool ended = status != run.summary.end() && *status != "running";
+  if (const std::string damage = damage_of_frames(run.directory); ended && !damage.empty())
+    return {{"The sample", "No picture: " + damage + "."}};
   const std::optional<Frame> frame = last_frame(run);
   if (!frame || frame->id.empty()) return {};
   std::vector<Wall> walls;

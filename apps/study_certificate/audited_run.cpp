@@ -64,7 +64,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   const Frame mean = mean_of_impact(problem.reflection, start.before, after, cell);
   const StepEnd end{mean, run.r, cell.gained};
   step.unexplained = disagreement(problem, end);
-  if (run.unknown > 0 || step.unexplained > rounding) {
+  if (run.unknown > 0 || !(step.unexplained <= rounding)) {
     step.judged = Judged::other_problem;
     step.why = fmt::format("{} contacts unknown to the audit, momentum unexplained {:.1e}", run.unknown,
                            step.unexplained);
@@ -90,7 +90,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
 }  // namespace
 
 bool AuditedRun::gave_up() const {
-  if (ended.empty() || steps.empty()) return false;
+  if (ended.empty() || !of_run || steps.empty()) return false;
   return !steps.back().certified || steps.back().overlapping;
 }
 
@@ -106,7 +106,9 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       Start start = start_of(simulation);
       if (simulation.steps_of_stage() == 0) stage_began = start.before.time;
       const auto run_start = Clock::now();
+      run.of_run = true;
       const StepReport& report = simulation.step();
+      run.of_run = false;
       AuditedStep step;
       step.run_seconds = seconds_since(run_start);
       start.stage.time_step = report.time_step;  // of stages that choose that of each step
@@ -129,6 +131,7 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       step.audit_seconds = seconds_since(audit_start);
       run.steps.push_back(std::move(step));
       if (progress) progress(run.steps.back());
+      run.of_run = true;
       simulation.begin_next_stage();
     }
   } catch (const std::exception& error) {

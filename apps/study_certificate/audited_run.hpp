@@ -42,9 +42,10 @@ struct AuditedStep {
 
 struct AuditedRun {
   std::vector<AuditedStep> steps;
-  std::string ended;  ///< "" when all steps were done; else the error that ended the run
+  std::string ended;    ///< "" when all steps were done; else the error that ended the run
+  bool of_run = false;  ///< it is the run's own, not one of the audit
 
-  /// An error did, behind a step that says of itself that it does not hold, as where pushed walls pass one
+  /// It ended by itself behind a step that says that it does not hold, as where pushed walls pass one
   /// another: the run has fooled nobody.
   bool gave_up() const;
 };

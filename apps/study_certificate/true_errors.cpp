@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "kernels/bodies/larger.hpp"
+
 namespace talus::audit {
 
 namespace {
@@ -62,7 +64,7 @@ double beyond_rounding(const StepProblem& problem, double mass, double error, do
 }
 
 /// Per grain: how many speeds that rounding makes its own may be off by. A row adds up those of its grains,
-/// of either sign.
+/// of either sign, and so do grains that one wall or cell ties together.
 std::vector<double> roundings(const StepProblem& problem) {
   std::size_t count = 0;
   const std::vector<std::size_t> cluster = clusters_of(problem, count);
@@ -201,7 +203,7 @@ double disagreement(const StepProblem& problem, const StepEnd& end) {
   for (const Vec3& r : end.r) impulse = std::max(impulse, r.norm());
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
     const double m = problem.mass[k], own = m * (end.after.u[k].norm() + problem.free.u[k].norm());
-    most = std::max(most, m * (motion.u[k] - end.after.u[k]).norm() / std::max(impulse, own));
+    most = larger(most, m * (motion.u[k] - end.after.u[k]).norm() / std::max(impulse, own));
   }
   // The cell gains of every contact, and prescribed components nothing.
   double all = 1e-300;
@@ -210,7 +212,7 @@ double disagreement(const StepProblem& problem, const StepEnd& end) {
   const double flow = problem.cell.length * (problem.cell.before.norm() + problem.cell.gain.norm());
   double mass = mass_of_cell(problem);
   if (mass == 0) mass = std::accumulate(problem.mass.begin(), problem.mass.end(), 0.0);
-  most = std::max(most, mass * (motion.cell - end.cell).norm() / std::max(all, mass * flow));
+  most = larger(most, mass * (motion.cell - end.cell).norm() / std::max(all, mass * flow));
   return most;
 }
 

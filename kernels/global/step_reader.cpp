@@ -97,7 +97,7 @@ std::array<std::int32_t, 2> StepReader::pair_at(std::size_t chunk, std::size_t p
 /// The speed at which the flow of a cell moves two touching bodies against one another [m/s]: that of the
 /// image's drift, scaled from the distance of the image to theirs. In a cell that follows a stress most of
 /// the drift is what the stress would do without contacts, and drives nothing, as the load of a pushed wall:
-/// there only what is prescribed counts.
+/// there the fastest prescribed component counts, whichever axis it is of.
 double StepReader::drive_of_flow(const ContactEquation& contact, const Vec3& drift) const {
   if (drift == Vec3::Zero()) return 0;
   const std::size_t a = begin_ + at(contact.first), b = begin_ + at(contact.second);

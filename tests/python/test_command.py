@@ -85,9 +85,31 @@ def test_a_scene_of_the_users_own_is_never_written_over(heap, tmp_path):
     scene = talus.Scene.load(own)
     scene["material.friction"] = 0.2
     for options in ({}, {"force": True}, {"resume": True}):
-        with pytest.raises(FileExistsError, match="no scene that talus.run wrote"):
+        with pytest.raises(FileExistsError, match="not as talus.run writes scenes"):
             talus.run(scene, tmp_path / "dam", progress=False, **options)
         assert own.read_text() == before
+    talus.run(heap, tmp_path / "run", threads=1, progress=False)
+    edited = (tmp_path / "run.toml").read_text() + "# mine\n"
+    (tmp_path / "run.toml").write_text(edited)
+    with pytest.raises(FileExistsError, match="not as talus.run writes scenes"):
+        talus.run(scene, tmp_path / "run", progress=False, force=True)
+    (tmp_path / "sweep").mkdir()
+    (tmp_path / "sweep" / "001.toml").write_text("# mine\n")
+    with pytest.raises(FileExistsError, match="001.toml"):
+        talus.sweep(heap, tmp_path / "sweep", friction=[0.1, 0.2], force=True)
+    (tmp_path / "linked.toml").symlink_to(own)
+    with pytest.raises(FileExistsError, match="symbolic link"):
+        talus.run(scene, tmp_path / "linked", progress=False, force=True)
+    assert own.read_text() == before and (tmp_path / "run.toml").read_text() == edited
+    assert [path.name for path in (tmp_path / "sweep").iterdir()] == ["001.toml"]
+
+
+def test_a_run_that_cannot_begin_leaves_no_scene(heap, tmp_path, monkeypatch):
+    program = talus.find_program()
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(FileNotFoundError, match="mpirun"):
+        talus.run(heap, tmp_path / "run", ranks=2, progress=False, program=program)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_scene_that_the_program_refuses_blocks_no_better_one(heap, tmp_path):

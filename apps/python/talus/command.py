@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 DONE, FAILED, BAD_INPUT, TOLERANCE_MISSED, STOPPED = 0, 1, 2, 3, 75
 POLL = 0.2  # [s] between looks at a run that goes on
 
-# First line of the scenes that `run` writes: others are the user's own, and stay.
-MARK = "# Written by talus.run, which may write it anew.\n"
+# First line of the scenes that `run` writes, with the CRC-32 of the rest: others are the user's own, and stay.
+MARK = b"# Written by talus.run, which may write it anew as long as nothing is changed in it: "
 
 Progress = Callable[[dict[str, Any]], None]
 
@@ -125,7 +126,12 @@ def run(
     if threads is not None:
         words += ["--threads", str(threads)]
     words += ["--force"] * force + ["--resume"] * resume + list(options)
-    exit_code, stderr = _follow(words, directory, _reporter(progress, name))
+    try:
+        exit_code, stderr = _follow(words, directory, _reporter(progress, name))
+    except OSError:  # mpirun is missing, for instance
+        if written is not None:
+            written.take_back()
+        raise
     if exit_code in (DONE, TOLERANCE_MISSED):
         return results.Run(directory)
     if exit_code == BAD_INPUT and written is not None:
@@ -138,40 +144,58 @@ class _SceneFile:
 
     def __init__(self, scene: Scene, directory: Path) -> None:
         self.path = directory.parent / f"{directory.name}.toml"
-        self.text = MARK + scene.toml_for(self.path.parent)
-        self.former = self.path.read_text(encoding="utf-8", errors="replace") if self.path.exists() else None
+        self.plain = scene.toml_for(self.path.parent).encode()
+        self.marked = MARK + f"{zlib.crc32(self.plain):08x}\n".encode() + self.plain
+        self.former = self.path.read_bytes() if self.path.exists() else None
 
     def holds_another(self) -> bool:
-        return self.former is not None and self.former not in (self.text, self.text.removeprefix(MARK))
+        return self.former is not None and self.former not in (self.marked, self.plain)
 
-    def put(self, replace: bool) -> None:
+    def demand_place(self, replace: bool) -> None:
         """Raises FileExistsError where there is another scene that must stay."""
-        if self.holds_another() and not (self.former or "").startswith(MARK):
-            raise FileExistsError(f"{self.path}: exists, and is no scene that talus.run wrote, which would be written there; "
+        if self.path.is_symlink():
+            raise FileExistsError(f"{self.path}: is a symbolic link, and the scene would be written there; choose another "
+                                  "directory of results")
+        if not self.holds_another():
+            return
+        head, _, rest = (self.former or b"").partition(b"\n")
+        if head != MARK + f"{zlib.crc32(rest):08x}".encode():
+            raise FileExistsError(f"{self.path}: exists, and is not as talus.run writes scenes, which would be written there; "
                                   "choose another directory of results")
-        if self.holds_another() and not replace:
+        if not replace:
             raise FileExistsError(f"{self.path}: exists and holds another scene; force=True begins anew, resume=True goes on "
                                   "with the changed scene, or choose another directory")
+
+    def put(self, replace: bool) -> None:
+        self.demand_place(replace)
         if self.former is None or self.holds_another():
-            self._write(self.text)
+            self._write(self.marked)
 
     def take_back(self) -> None:
-        """What was there before `put`."""
+        """What was there before `put`, unless somebody has written there since."""
+        if self.former in (self.marked, self.plain) or not self.path.exists() or self.path.read_bytes() != self.marked:
+            return
         if self.former is None:
-            self.path.unlink(missing_ok=True)
-        elif self.holds_another():
+            self.path.unlink()
+        else:
             self._write(self.former)
 
-    def _write(self, text: str) -> None:
+    def _write(self, content: bytes) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        part = self.path.with_name(self.path.name + ".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(self.path)
+        number, part = tempfile.mkstemp(prefix=self.path.name + ".", suffix=".part", dir=self.path.parent)
+        try:
+            with os.fdopen(number, "wb") as file:
+                file.write(content)
+            os.chmod(part, 0o644)
+            os.replace(part, self.path)
+        except BaseException:
+            os.unlink(part)
+            raise
 
 
-def holds_another_scene(scene: Scene, directory: Path) -> bool:
-    """The scene beside the results in `directory` is there, and is not what `run` would write."""
-    return _SceneFile(scene, directory).holds_another()
+def demand_place_of_scene(scene: Scene, directory: Path, replace: bool) -> None:
+    """Raises FileExistsError where `run` would not write the scene beside the results in `directory`."""
+    _SceneFile(scene, directory).demand_place(replace)
 
 
 def _follow(words: list[str], directory: Path, report: Progress) -> tuple[int, str]:

@@ -17,6 +17,3 @@ class NotARun(ValueError):
 
 class DamagedFile(ValueError):
     """A file of a run that does not hold what the program writes into it; the message names it."""
-
-
-MENDS = "`talus run ... --resume` writes it anew from a checkpoint, where there is one"

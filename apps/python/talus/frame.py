@@ -10,7 +10,7 @@ from typing import Callable, TypeVar
 import h5py
 import numpy as np
 
-from .errors import MENDS, DamagedFile, MissingData, NotThere
+from .errors import DamagedFile, MissingData, NotThere
 
 T = TypeVar("T")
 
@@ -44,13 +44,14 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
                 return read(file)
         except FileNotFoundError:
             raise MissingData(f"{path}: no such file; the run has not come to its first frame") from None
-        except MissingData:
+        except (MissingData, PermissionError):
             raise
         except (OSError, KeyError, RuntimeError) as error:
             if attempt + 1 == RETRIES and isinstance(error, NotThere):
                 raise MissingData(error.args[0]) from None
             if attempt + 1 == RETRIES:
-                raise DamagedFile(f"{path}: cannot be read: {error}; {MENDS}") from error
+                raise DamagedFile(f"{path}: cannot be read: {error}; where a run was killed, `talus run ... "
+                                  "--resume` mends the file") from error
             if "locking flag" in str(error):  # the caller has it open, as h5py opens files by itself
                 locking = None
                 continue

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .command import RunError, holds_another_scene, run
+from .command import RunError, demand_place_of_scene, run
 from .results import Run
 from .scene import Scene, SceneError
 
@@ -96,7 +96,8 @@ def sweep(
     {"peak": lambda run: run.triaxial["q_over_p"].max()}. The table is also written to out/sweep.csv.
 
     All scenes are checked before the first run begins: raises SceneError where one is wrong, ValueError where nothing is
-    varied, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them. A run that
+    varied, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them, or has
+    scenes of other values, or of the user's own, which stay. A run that
     fails does not end the others: its row has the exit code, `errors` the message. What a `measure` raises is raised
     when all runs have ended and the table is written, with NaN in its place.
     """
@@ -122,10 +123,8 @@ def sweep(
     if there and not (resume or force):
         raise FileExistsError(f"{there[0]} holds a run: resume=True keeps what is done, force=True runs all anew")
 
-    others = [directory for changed, directory in zip(scenes, directories) if holds_another_scene(changed, directory)]
-    if others and not force:
-        raise FileExistsError(f"{others[0]}: its run is of another scene; force=True runs all anew, or choose another "
-                              "directory")
+    for changed, directory in zip(scenes, directories):
+        demand_place_of_scene(changed, directory, replace=force)
 
     def one(changed: Scene, directory: Path) -> RunError | None:
         try:

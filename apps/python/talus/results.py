@@ -11,7 +11,7 @@ from typing import Any, overload
 import h5py
 import numpy as np
 
-from .errors import MENDS, DamagedFile, MissingData, NotARun, NotThere
+from .errors import DamagedFile, MissingData, NotARun, NotThere
 from .frame import Frame, read_file, text
 from .tables import read_table
 
@@ -77,7 +77,7 @@ class Run:
         """Steps so far that missed their tolerance or overlapped beyond it; 0: every step carries its certificate."""
         steps = self.steps
         if "converged" not in (steps.dtype.names or ()):
-            raise DamagedFile(f"{self.directory / 'steps.csv'}: has no column `converged`; {MENDS}")
+            raise DamagedFile(f"{self.directory / 'steps.csv'}: has no column `converged`, as the table of a run has")
         return int(np.count_nonzero(~steps["converged"])) if len(steps) else 0
 
     @property
@@ -192,7 +192,8 @@ def _parsed(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
     try:
         content = parse(path.read_text(encoding="utf-8"))
     except ValueError as error:  # also what is no UTF-8
-        raise DamagedFile(f"{path}: is damaged: {error}; {MENDS}") from error
+        raise DamagedFile(f"{path}: is damaged: {error}; `talus run ... --resume` writes it anew from a checkpoint, where "
+                          "there is one") from error
     if not isinstance(content, dict):
         raise DamagedFile(f"{path}: is damaged: it holds no table of names and values")
     return content

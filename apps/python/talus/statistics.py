@@ -49,9 +49,10 @@ def force_distribution(forces: ArrayLike, bins: int | ArrayLike = 40) -> tuple[n
     if len(f) == 0:
         raise ValueError("no contact carries a force")
     f = f / f.mean()
-    if np.ndim(bins) == 0 and bins < 1:
+    number = isinstance(bins, (int, np.integer))
+    if number and bins < 1:
         raise ValueError(f"bins must be 1 or more, got {bins}")
-    edges = np.linspace(0, f.max(), bins + 1) if np.ndim(bins) == 0 else np.asarray(bins, dtype=float)
+    edges = np.linspace(0, f.max(), int(bins) + 1) if number else np.asarray(bins, dtype=float)
     counts, edges = np.histogram(f, edges)
     return 0.5 * (edges[1:] + edges[:-1]), counts / (max(counts.sum(), 1) * np.diff(edges))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .errors import MENDS, DamagedFile
+from .errors import DamagedFile
 
 # Columns that hold whole numbers. Types do not follow from the values: a velocity may be "0" in every row.
 INTEGERS = frozenset({
@@ -33,7 +33,7 @@ def read_table(path: str | os.PathLike[str]) -> np.ndarray:
         with path.open(encoding="utf-8", newline="") as file:
             text = file.read()
     except UnicodeDecodeError as error:
-        raise DamagedFile(f"{path}: is damaged: {error}; {MENDS}") from error
+        raise DamagedFile(f"{path}: is damaged: {error}") from error
     text = text[: text.rfind("\n") + 1]
     header, _, body = text.partition("\n")
     names = next(csv.reader([header]), [])

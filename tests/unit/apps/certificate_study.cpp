@@ -323,6 +323,8 @@ TEST(CertificateStudy, ARunThatEndsByAnErrorHasGivenUpOnlyBehindAStepThatDoesNot
   run.steps.emplace_back().certified = true;
   EXPECT_FALSE(run.gave_up());
   run.steps.back().overlapping = true;
+  EXPECT_FALSE(run.gave_up());  // the audit's own error
+  run.of_run = true;
   EXPECT_TRUE(run.gave_up());
   run.steps.back() = {};
   EXPECT_TRUE(run.gave_up());
