@@ -98,6 +98,16 @@ TEST(ReplayDecisions, SumsGoTheRestOfTheirWayWhenAllWait) {
   }
 }
 
+/// Adds a copy of `epoch` that is number `e` and begins later by `now` [ns].
+void repeat_epoch(const std::vector<Record>& epoch, std::int32_t e, std::int64_t now,
+                  std::vector<Record>& records) {
+  for (Record record : epoch) {
+    record.begin += now;
+    record.epoch = e;
+    records.push_back(record);
+  }
+}
+
 /// Two subdomains on one rank, twice: an epoch whose sums the next one needs (1 ns, two calls), another
 /// without a decision, and one with a check.
 Trace conjugate() {
@@ -110,11 +120,7 @@ Trace conjugate() {
   records = {before};
   std::int64_t now = 0;
   for (std::int32_t e = 0; e < 6; ++e) {
-    for (Record record : epochs[0]) {
-      record.begin += now;
-      record.epoch = e;
-      records.push_back(record);
-    }
+    repeat_epoch(epochs[0], e, now, records);
     now += 360;
     if (e % 3 == 0) {
       records.push_back({now, 1, 0, e, pack(1, kind_check)});
@@ -270,11 +276,7 @@ Trace with_an_early_look(std::int64_t length) {
   records = {before};
   std::int64_t now = 0;
   for (std::int32_t e = 0; e < 4; ++e) {
-    for (Record record : epoch) {
-      record.begin += now;
-      record.epoch = e;
-      records.push_back(record);
-    }
+    repeat_epoch(epoch, e, now, records);
     now += 360;
     const std::int64_t look = e == 0 ? length : 0;
     records.push_back({now, static_cast<float>(look), 0, e, pack(1, kind_check)});
