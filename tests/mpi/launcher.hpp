@@ -79,8 +79,10 @@ class OnRanks : public CommandTest {
 };
 
 /// 300 grains between a moving lid and five fixed walls, in six subdomains, dealt out anew every third step.
+/// Steps that miss are allowed: mpirun takes a second or two to end ranks whose exit code is not 0.
 inline const std::string six_subdomains = R"(name = "ranks"
 box = true
+allow_unconverged = true
 time_step = 1e-3
 [material]
 density = 2600
