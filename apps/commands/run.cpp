@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -40,19 +43,13 @@ namespace talus {
 
 namespace {
 
-int threads_of(const RunOptions& options) {
+/// A thread for fewer grains costs more than it does.
+constexpr std::int64_t grains_per_thread = 2000;
+
+/// As asked, or as many as there can be.
+int most_threads(const RunOptions& options) {
   if (graph::simulated_ranks) return 1;
   return options.threads > 0 ? options.threads : omp_get_num_procs();
-}
-
-/// The order that the run is to follow. Throws std::invalid_argument when it was recorded on another machine.
-trace::Trace order_of(const RunOptions& options, const graph::Communicator& ranks) {
-  trace::Trace recorded = io::read_trace(options.replay_order);
-  if (recorded.ranks != ranks.ranks() || recorded.threads != threads_of(options))
-    throw std::invalid_argument(fmt::format("{} was recorded on {} ranks x {} threads, this run has {} x {}",
-                                            options.replay_order, recorded.ranks, recorded.threads,
-                                            ranks.ranks(), threads_of(options)));
-  return recorded;
 }
 
 /// What a run is made of once the ranks agree that it can begin.
@@ -71,7 +68,21 @@ struct Prepared {
   std::optional<ResumePoint> point;
   std::optional<int> nothing_left;     ///< exit code of the run that has been done
   std::optional<std::int64_t> enough;  ///< its last step, where --steps asks for no more
+  int threads = 1;                     ///< of each rank
 };
+
+/// The order that the run is to follow, on as many threads unless others are asked for. Throws
+/// std::invalid_argument when it was recorded on another machine.
+trace::Trace order_of(const RunOptions& options, const graph::Communicator& ranks, int& threads) {
+  trace::Trace recorded = io::read_trace(options.replay_order);
+  if (options.threads == 0 && !graph::simulated_ranks) threads = recorded.threads;
+  if (recorded.ranks != ranks.ranks() || recorded.threads != threads)
+    throw std::invalid_argument(fmt::format("{} was recorded on {} ranks x {} threads, this run has {} x {}",
+                                            options.replay_order, recorded.ranks, recorded.threads,
+                                            ranks.ranks(), threads));
+  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads);
+  return recorded;
+}
 
 void check_options(const RunOptions& options, const graph::Communicator& ranks) {
   if (options.threads < 0)
@@ -79,11 +90,11 @@ void check_options(const RunOptions& options, const graph::Communicator& ranks) 
   if (graph::simulated_ranks && options.threads > 1)
     throw std::invalid_argument(
         fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
-  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads_of(options));
+  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), most_threads(options));
   if (options.steps && *options.steps < 1)
     throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
   if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
-  if (options.trace_own_caches && (ranks.ranks() > 1 || threads_of(options) > 1))
+  if (options.trace_own_caches && (ranks.ranks() > 1 || most_threads(options) > 1))
     throw std::invalid_argument(
         "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
         "with --threads 1");
@@ -93,11 +104,12 @@ void check_options(const RunOptions& options, const graph::Communicator& ranks) 
         "--resume goes on with the results that --force removes: give one of the two");
 }
 
-void read_recordings(const RunOptions& options, const graph::Communicator& ranks, Recordings& recordings) {
+void read_recordings(const RunOptions& options, const graph::Communicator& ranks, Prepared& run) {
   if (!options.replay_order.empty())
-    recordings.order = std::make_unique<trace::Order>(order_of(options, ranks), ranks.rank());
+    run.recordings.order =
+        std::make_unique<trace::Order>(order_of(options, ranks, run.threads), ranks.rank());
   if (!options.task_times.empty())
-    recordings.times =
+    run.recordings.times =
         std::make_unique<trace::TaskTimes>(io::read_trace(options.task_times), ranks.ranks(), ranks.rank());
 }
 
@@ -136,6 +148,20 @@ void look_for_checkpoint(const RunOptions& options, const graph::Communicator& r
   }
 }
 
+/// Grains that the run begins or goes on with, on rank 0.
+std::size_t grains_of(const Prepared& run) {
+  return run.point ? static_cast<std::size_t>(run.point->file.state.head.size.bodies) : run.sample.size();
+}
+
+/// Collective. What nobody has said of threads follows from the grains; of those to come nothing is known.
+void settle_threads(const RunOptions& options, const graph::Communicator& ranks, Prepared& run) {
+  if (options.threads > 0 || run.recordings.order || !run.scene.setup.inserts.empty()) return;
+  std::int64_t grains = ranks.rank() == 0 ? static_cast<std::int64_t>(grains_of(run)) : 0;
+  ranks.sum(std::span(&grains, 1));
+  const std::int64_t enough = grains / (grains_per_thread * ranks.ranks());
+  run.threads = static_cast<int>(std::clamp<std::int64_t>(enough, 1, run.threads));
+}
+
 void print_warnings(const Terminal& terminal, const Prepared& run) {
   for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);
 }
@@ -165,7 +191,8 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
   };
   const bool loaded = agreed([&] {
     check_options(options, ranks);
-    read_recordings(options, ranks, run.recordings);
+    run.threads = most_threads(options);
+    read_recordings(options, ranks, run);
     std::optional<double> given;
     if (!options.max_walltime.empty()) given = parse_duration(options.max_walltime);
     run.granted = time_granted(given);
@@ -211,7 +238,7 @@ io::Provenance provenance_of(const RunOptions& options, const graph::Communicato
                              const Prepared& run) {
   const io::Scene& scene = run.scene;
   io::Provenance provenance = io::collect_provenance();
-  provenance.threads = threads_of(options);
+  provenance.threads = run.threads;
   provenance.simd = name_of(SweepKernels(settled(scene.setup.solver.simd, ranks)).set());
   provenance.command_line = options.command_line;
   provenance.seed = scene.setup.seed;
@@ -267,9 +294,7 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
     terminal.keep_in(run.directory + "/run.log", run.point.has_value());
     io::write_whole(run.directory + "/scene.resolved.toml", io::resolved_scene(scene));
     StatusFile(run.directory).begin();
-    const std::size_t grains =
-        run.point ? static_cast<std::size_t>(run.point->file.state.head.size.bodies) : run.sample.size();
-    print_start(terminal, scene, grains, provenance.threads, ranks);
+    print_start(terminal, scene, grains_of(run), provenance.threads, ranks);
     if (run.point)
       print_resumption(terminal, *run.point);
     else
@@ -316,6 +341,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     return *run.nothing_left;
   }
   share_walls(run.scene.setup, ranks);
+  settle_threads(options, ranks, run);
   catch_signals();
   try {
     return run_scene(options, ranks, terminal, std::move(run), began);

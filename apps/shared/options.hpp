@@ -32,9 +32,9 @@ inline CLI::Validator thread_count() {
   return CLI::Range(1, 4096);
 }
 
-/// --threads; what is left as it is stands for one per core.
-inline void add_threads(CLI::App& app, int& threads) {
-  app.add_option("--threads", threads, "threads [one per core]")->type_name("N")->check(thread_count());
+/// --threads; what is left as it is stands for `otherwise`.
+inline void add_threads(CLI::App& app, int& threads, const std::string& otherwise = "one per core") {
+  app.add_option("--threads", threads, "threads [" + otherwise + "]")->type_name("N")->check(thread_count());
 }
 
 /// --set, once for each "a.b=c".

@@ -142,6 +142,11 @@ TEST_F(TraceCommand, ARunFollowsARecordedOrderToTheSameBits) {
       trace);
   ASSERT_TRUE(again.code == 0 || again.code == 3) << again.messages;
   EXPECT_EQ(summary(folder_ / "again")["digest"], summary(folder_ / "out")["digest"]);
+  const Outcome alike =
+      talus("run scene.toml --out alike --steps 5 --trace --set decomposition.subdomains=4 --replay-order " +
+            trace);
+  ASSERT_EQ(alike.code, again.code) << "on as many threads as the recorded one: " << alike.messages;
+  EXPECT_EQ(summary(folder_ / "alike")["digest"], summary(folder_ / "out")["digest"]);
   const Outcome threads = talus("run scene.toml --out other --threads 2 --replay-order " + trace);
   EXPECT_EQ(threads.code, 2) << threads.messages;
   const Outcome scene = talus("run scene.toml --out third --threads 3 --replay-order " + trace);
