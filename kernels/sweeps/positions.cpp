@@ -62,8 +62,9 @@ void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t c
       gap = touch_of(poses, contacts, k, wall).gap;
     }
     single.contacts.bias[k] = static_cast<float>(gap < 0 ? part * gap : gap);
-    // Displacements do not drift.
-    if (contacts.drifts_between) single.contacts.vx[k] = single.contacts.vy[k] = single.contacts.vz[k] = 0;
+    // Displacements do not drift, neither of images nor of a wall that turns.
+    if (!single.contacts.vx.empty())
+      single.contacts.vx[k] = single.contacts.vy[k] = single.contacts.vz[k] = 0;
   }
 }
 

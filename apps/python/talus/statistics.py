@@ -74,10 +74,12 @@ def pair_correlation(
     shells of equal thickness.
     Returns the mean radius of each shell [m] and g [1]; time and memory grow as n times the neighbours within r_max.
 
-    Raises ValueError where r_max is no distance of this box: more than half of it between two of its faces; and for
-    shears between directions that are not both periodic.
+    Raises ValueError where r_max is no distance of this box: more than half of it between two of its faces; for
+    shears between directions that are not both periodic; and for centres that are no numbers.
     """
     x, low, high = np.asarray(positions, float).reshape(-1, 3), np.asarray(low, float), np.asarray(high, float)
+    if not np.isfinite(x).all():
+        raise ValueError(f"positions: those of {np.count_nonzero(~np.isfinite(x).all(axis=1))} grains are no numbers")
     size, wraps = high - low, np.broadcast_to(np.asarray(periodic, bool), 3)
     edges_of_cell, pairs = np.diag(size), ((0, 1), (0, 2), (1, 2))
     for (i, j), shear in zip(pairs, np.broadcast_to(np.asarray(shears, float), 3)):

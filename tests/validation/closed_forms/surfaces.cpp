@@ -114,5 +114,32 @@ TEST(BallInAMeshCorner, IsHeldByItsFacesAndNotByTheirEdge) {
   EXPECT_LT((run.x() - Vec3(radius, 0.47, radius)).norm(), 1e-10);
 }
 
+// The drift of a wall that turns was taken for a displacement: a ball jumped by the numbers of a velocity.
+TEST(BallPushedByAPaddle, IsShiftedByOverlapsOnlyWhileTheyAreUndone) {
+  const Vec3 away(0.3, 0, 0);
+  const double rate = 2, part = 0.1, speed = rate * away.norm();
+  for (const std::string paddle : {"plane", "rectangle", "mesh"}) {
+    Scene scene(h);
+    scene.setup.solver.overlap_correction = part;
+    if (paddle == "plane") scene.wall(paddle, Vec3::Zero(), Vec3::UnitZ());
+    if (paddle == "rectangle")
+      scene.surface(paddle, {{"corner", {-1, -1, 0}}, {"edge_a", {2, 0, 0}}, {"edge_b", {0, 2, 0}}});
+    if (paddle == "mesh") scene.surface(paddle, {}, test::box_mesh({-1, -1, -0.1}, {1, 1, 0}, 3));
+    scene.setup.walls.back().motion = {test::rotation(-Vec3::UnitY(), Vec3::Zero(), rate)};
+    scene.sphere(away + Vec3(0, 0, radius), radius, mass);
+    Experiment run(std::move(scene));
+    double impulse = 0;
+    for (int step = 0; step < 50; ++step) {
+      const Vec3 x = run.x(), u = run.u();
+      run.step();
+      impulse += h * run.wall_force(0)[2];
+      // An overlap is what the paddle sweeps over in a step, at most.
+      EXPECT_LT((run.x() - x - 0.5 * h * (u + run.u())).norm(), part * h * speed)
+          << paddle << ", step " << step;
+    }
+    EXPECT_GT(impulse, 0.99 * mass * speed) << paddle;
+  }
+}
+
 }  // namespace
 }  // namespace talus::validation::closed_form_surfaces_test
