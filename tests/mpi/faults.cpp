@@ -7,6 +7,7 @@
 #include <chrono>
 #include <fstream>
 #include <thread>
+#include <vector>
 
 #include "io/results/results.hpp"
 #include "tests/mpi/launcher.hpp"
@@ -74,8 +75,9 @@ double seconds_since(std::chrono::steady_clock::time_point began) {
 
 TEST_F(Faulty, FullDiskEndsAllRanksWithTheReason) {
   if (on_disk(64, "exit 0").code != 0) GTEST_SKIP() << "a disk of its own takes the right to mount one";
+  // mpirun takes seconds to end ranks that fail: of several, half of the disks.
   for (const int ranks : {1, 2}) {
-    for (const int kilobytes : {72, 92, 100, 112, 120}) {
+    for (const int kilobytes : ranks == 1 ? std::vector{72, 92, 100, 112, 120} : std::vector{92, 112}) {
       const auto began = std::chrono::steady_clock::now();
       const Outcome outcome = on_disk(
           kilobytes, command(ranks) + "--out disk/results; code=$?; cp disk/results/run.json .; exit $code");
@@ -96,7 +98,7 @@ TEST_F(Faulty, DiskThatFillsAndIsFreedLosesNothing) {
   ASSERT_EQ(straight.code, 0) << straight.messages;
   const std::size_t frames = io::frame_count(at("straight/results.h5"));
   for (const int ranks : {1, 2}) {
-    for (const int room : {96, 160, 200, 240}) {
+    for (const int room : ranks == 1 ? std::vector{96, 160, 200, 240} : std::vector{96, 200}) {
       // The rest of a disk of 4 MB is taken; the run fails; it is given back; the same line goes on.
       const std::string line = command(ranks) + "--resume --out disk/results";
       const Outcome outcome =

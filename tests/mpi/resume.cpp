@@ -185,7 +185,7 @@ TEST_F(Resumed, AfterKillsAtAnyMomentEndInTheSameBits) {
   const double takes = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   ASSERT_EQ(straight.code, 0) << straight.messages;
   int kills = 0;
-  for (const int wanted = times("TALUS_KILLS", 20); kills < wanted;) {
+  for (const int wanted = times("TALUS_KILLS", 12); kills < wanted;) {
     fs::remove_all(at_("parts"));
     std::string history;
     int code = -1;

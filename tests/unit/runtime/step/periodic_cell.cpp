@@ -119,7 +119,7 @@ TEST(PeriodicRun, HasTheSameBitsOnAnyRanksAndThreads) {
     for (const int subdomains : {2, 8}) {
       if (subdomains == 2 && &variant != &decomposition_test::variants[3]) continue;
       talus::Setup setup = colliding(12);
-      setup.solver.max_iterations = 40;
+      setup.solver.max_iterations = 20;
       decomposition_test::choose(setup, variant, subdomains);
       setup.decomposition.repartition_every = 3;
       const Outcome one = simulate(setup, flying());
