@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "apps/commands/plan_measure.hpp"
+#include "apps/commands/threads.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
@@ -134,7 +135,9 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
   }
   try {
     scene.setup.solver.max_iterations = 1;  // the contacts are wanted, not their impulses
-    const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+    const int threads = options.threads > 0 ? options.threads
+                                            : threads_for(scene, static_cast<std::int64_t>(bodies.size()),
+                                                          ranks.ranks(), omp_get_num_procs());
     graph::Executor executor({.threads = threads});
     for (std::size_t k = 0; k < scene.setup.stages.size(); ++k) {
       Setup setup =

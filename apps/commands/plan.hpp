@@ -9,7 +9,7 @@ namespace talus {
 
 struct PlanOptions {
   std::string scene;
-  int threads = 0;       ///< 0: one per core this process may use
+  int threads = 0;       ///< 0: as threads_for says
   bool measure = false;  ///< also what each omission saves, by a benchmark of some seconds
   std::vector<std::string> overrides;
 };

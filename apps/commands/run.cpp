@@ -22,6 +22,7 @@
 #include "apps/commands/run_status.hpp"
 #include "apps/commands/run_steps.hpp"
 #include "apps/commands/step_list.hpp"
+#include "apps/commands/threads.hpp"
 #include "apps/report/run_report.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
@@ -42,9 +43,6 @@
 namespace talus {
 
 namespace {
-
-/// A thread for fewer grains costs more than it does.
-constexpr std::int64_t grains_per_thread = 2000;
 
 /// As asked, or as many as there can be.
 int most_threads(const RunOptions& options) {
@@ -80,24 +78,18 @@ trace::Trace order_of(const RunOptions& options, const graph::Communicator& rank
     throw std::invalid_argument(fmt::format("{} was recorded on {} ranks x {} threads, this run has {} x {}",
                                             options.replay_order, recorded.ranks, recorded.threads,
                                             ranks.ranks(), threads));
-  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads);
   return recorded;
 }
 
-void check_options(const RunOptions& options, const graph::Communicator& ranks) {
+void check_options(const RunOptions& options) {
   if (options.threads < 0)
     throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
   if (graph::simulated_ranks && options.threads > 1)
     throw std::invalid_argument(
         fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
-  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), most_threads(options));
   if (options.steps && *options.steps < 1)
     throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
   if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
-  if (options.trace_own_caches && (ranks.ranks() > 1 || most_threads(options) > 1))
-    throw std::invalid_argument(
-        "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
-        "with --threads 1");
   if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
   if (options.resume && options.force)
     throw std::invalid_argument(
@@ -153,13 +145,20 @@ std::size_t grains_of(const Prepared& run) {
   return run.point ? static_cast<std::size_t>(run.point->file.state.head.size.bodies) : run.sample.size();
 }
 
-/// Collective. What nobody has said of threads follows from the grains; of those to come nothing is known.
+/// Collective. What nobody has said of threads follows from the grains.
 void settle_threads(const RunOptions& options, const graph::Communicator& ranks, Prepared& run) {
-  if (options.threads > 0 || run.recordings.order || !run.scene.setup.inserts.empty()) return;
+  if (options.threads > 0 || run.recordings.order) return;
   std::int64_t grains = ranks.rank() == 0 ? static_cast<std::int64_t>(grains_of(run)) : 0;
   ranks.sum(std::span(&grains, 1));
-  const std::int64_t enough = grains / (grains_per_thread * ranks.ranks());
-  run.threads = static_cast<int>(std::clamp<std::int64_t>(enough, 1, run.threads));
+  run.threads = threads_for(run.scene, grains, ranks.ranks(), run.threads);
+}
+
+void check_threads(const RunOptions& options, const graph::Communicator& ranks, int threads) {
+  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads);
+  if (options.trace_own_caches && (ranks.ranks() > 1 || threads > 1))
+    throw std::invalid_argument(
+        "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
+        "with --threads 1");
 }
 
 void print_warnings(const Terminal& terminal, const Prepared& run) {
@@ -190,7 +189,7 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
     return !any_refused(refused, ranks);
   };
   const bool loaded = agreed([&] {
-    check_options(options, ranks);
+    check_options(options);
     run.threads = most_threads(options);
     read_recordings(options, ranks, run);
     std::optional<double> given;
@@ -206,7 +205,7 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
   });
   if (!loaded) return false;
   if (options.resume && !agreed([&] { look_for_checkpoint(options, ranks, terminal, run); })) return false;
-  return agreed([&] {
+  const bool placed = agreed([&] {
     if (ranks.rank() != 0) return;
     for (const std::string& file : io::input_files(run.scene))
       run.input_files.push_back({file, io::crc_of_file(file)});
@@ -217,6 +216,9 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
       demand_results_of_scene(run.directory, run.scene, run.nothing_left.has_value());
     if (!run.nothing_left) speak_of_sample(options, terminal, run);
   });
+  if (!placed) return false;
+  settle_threads(options, ranks, run);
+  return agreed([&] { check_threads(options, ranks, run.threads); });
 }
 
 /// The results are those of a run from here on: a directory of its own, or the one that it goes on in.
@@ -341,7 +343,6 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     return *run.nothing_left;
   }
   share_walls(run.scene.setup, ranks);
-  settle_threads(options, ranks, run);
   catch_signals();
   try {
     return run_scene(options, ranks, terminal, std::move(run), began);

@@ -14,7 +14,7 @@ struct RunOptions {
   std::string out;                        ///< directory of the results; empty: the scene's
   bool force = false;                     ///< replace earlier results in `out`
   std::optional<std::int64_t> steps;      ///< stop after so many steps
-  int threads = 0;                        ///< 0: one per core and per so many grains
+  int threads = 0;                        ///< 0: as threads_for says
   std::vector<std::string> overrides;     ///< "a.b=c"
   std::string error_history;              ///< steps whose checks go to error_history.csv (StepList)
   std::vector<std::int64_t> dump_fclib;   ///< steps whose contact problem is dumped (fclib_dump)

@@ -175,6 +175,16 @@ TEST_F(Ranks, MoreThanSubdomainsAreRefusedByAll) {
   EXPECT_FALSE(fs::exists(at("refused")));
 }
 
+TEST_F(Ranks, HaveTheThreadsThatTheirShareOfGrainsIsWorth) {
+  const std::string loose =
+      "time_step = 1e-3\nmaterial = { density = 2600 }\nstage = [{ end = { steps = 1 } }]\n"
+      "output = { pictures = false }\n[sample]\nkind = \"lattice\"\ncount = 4000\nbase = [0.4, 0.4]\n"
+      "radius = 0.01\n";
+  write(at("scene.toml"), loose);
+  ASSERT_EQ(run(2, "run scene.toml --out two").code, 0);
+  EXPECT_EQ(nlohmann::json::parse(file("two", "run.json")).at("provenance").at("threads"), 1);
+}
+
 TEST_F(Ranks, EndTogetherOnBadInputAndWithMissedSteps) {
   const Outcome outcome = run(2, "run missing.toml --threads 1");
   EXPECT_EQ(outcome.code, 2) << outcome.messages;

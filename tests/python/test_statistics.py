@@ -103,6 +103,13 @@ def test_more_than_half_of_the_box_is_refused():
         talus.pair_correlation(lattice(3), [0] * 3, [3] * 3, 1.6)
 
 
+def test_centres_that_are_no_numbers_are_refused():
+    x = lattice(3)
+    x[4, 1] = np.nan
+    with pytest.raises(ValueError, match="those of 1 grains are no numbers"):
+        talus.pair_correlation(x, [0] * 3, [3] * 3, 0.5)
+
+
 def lone_grain(velocity, **stage):
     """A run of one grain in a periodic cell, which flies at a velocity; a frame each tenth of a second."""
     return {

@@ -1,8 +1,11 @@
 #include "apps/commands/commands.hpp"
 
+#include <fmt/format.h>
+
 #include <cstdlib>
 
 #include "apps/commands/run.hpp"
+#include "apps/commands/threads.hpp"
 #include "apps/shared/options.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/mpi_communicator.hpp"
@@ -23,7 +26,7 @@ void add_options(CLI::App& app, RunOptions& options) {
       ->type_name("H:MM:SS");
   app.add_option("--steps", options.steps, "stop after so many time steps")->type_name("N");
   app.add_flag("--quiet", options.quiet, "say nothing on stderr but warnings and errors; run.log has it all");
-  add_threads(app, options.threads, "one per core and 2000 grains");
+  add_threads(app, options.threads, fmt::format("one per core and {} grains", grains_per_thread));
   add_overrides(app, options.overrides);
   app.add_option("--error-history", options.error_history,
                  "steps whose errors go to error_history.csv at every check: 7, 10:20, 1,5,100:120")

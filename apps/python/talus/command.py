@@ -90,7 +90,7 @@ def run(
     as OUT.toml. What stands there is written over with `force` or `resume` only, and only where this function wrote it;
     it stays where the program finds the scene wrong.
     out: directory of the results, by default out/NAME. Results that are there are refused without `force` or `resume`.
-    ranks, threads: MPI ranks (by mpirun) and threads of each; all cores where nothing is said.
+    ranks, threads: MPI ranks (by mpirun) and threads of each; where nothing is said as `talus run` chooses.
     settings: keys that differ from the scene, {"material.friction": 0.5}.
     options: further options of `talus run`: ["--steps", "10"].
     progress: True writes a line to stderr; a function is called with what status.json has, about twice a second.

@@ -159,6 +159,15 @@ TEST_F(Resume, IsTheSameLineUntilItIsDone) {
             "stage.shear.end.steps was 200 and is 210");
 }
 
+TEST_F(Resume, EndsWithTheCodeOfStepsThatMiss) {
+  const std::string line =
+      "run scene.toml --out out --threads 1 --resume --set solver.max_iterations=3 --set "
+      "solver.direct_bodies=0 ";
+  const Outcome begun = run(line + "--steps 6"), rest = run(line);
+  EXPECT_EQ(begun.code, 3) << begun.messages;
+  EXPECT_EQ(rest.code, 3) << rest.messages;
+}
+
 TEST_F(Resume, LeavesADoneRunAloneWhateverBecameOfItsTables) {
   const std::string line = "run scene.toml --out out --threads 1 --resume";
   ASSERT_EQ(run(line).code, 0);

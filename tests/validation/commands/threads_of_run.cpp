@@ -30,6 +30,7 @@ radius = 0.01
 [output]
 pictures = false
 [[stage]]
+name = "fly"
 end = {{ steps = 1 }}
 )",
                                         grains, more));
@@ -54,13 +55,28 @@ TEST_F(ThreadsOfARun, AreAsManyAsAskedFor) {
   EXPECT_EQ(provenance("--threads 3").at("threads"), 3);
 }
 
-TEST_F(ThreadsOfARun, AreOneForEachCoreWhereGrainsAreStillToCome) {
-  write_scene(8, R"([[insert]]
+TEST_F(ThreadsOfARun, CountGrainsToComeAndAreOneForEachCoreWhereNobodyKnowsHowMany) {
+  const std::string insert = R"([[insert]]
 radius = 0.01
-count = 3
-region = { shape = "box", low = [1, 1, 1], high = [2, 2, 2] })");
-  const nlohmann::json run = provenance();
-  EXPECT_EQ(run.at("threads"), run.at("cores_allowed"));
+region = { shape = "box", low = [1, 1, 1], high = [2, 2, 2] }
+)";
+  write_scene(8, insert + "count = 3");
+  EXPECT_EQ(provenance().at("threads"), 1);
+  for (const char* more : {"count = 5000", "mass_rate = 1.0"}) {
+    write_scene(8, insert + more);
+    const nlohmann::json run = provenance();
+    EXPECT_EQ(run.at("threads"), std::min(2, run.at("cores_allowed").get<int>())) << more;
+  }
+}
+
+TEST_F(ThreadsOfARun, ThatGoesOnFollowFromItsGrains) {
+  write_scene(4000);
+  provenance("--threads 1 --set checkpoint.every_steps=1");
+  const std::string line =
+      "run scene.toml --out out --resume --set checkpoint.every_steps=1 --set stage.fly.end.steps=";
+  EXPECT_EQ(run(line + "3").code, 0);
+  const auto again = nlohmann::json::parse(content(at("out/run.json"))).at("provenance");
+  EXPECT_EQ(again.at("threads"), std::min(2, again.at("cores_allowed").get<int>()));
 }
 
 }  // namespace

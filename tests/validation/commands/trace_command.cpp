@@ -108,7 +108,7 @@ TEST_F(TraceCommand, RecordsShowsExportsAndReplays) {
   ASSERT_EQ(show.code, 0) << show.messages;
   for (const char* word :
        {"partitioning", "contact detection", "inloop 1", "inloop 2", "update", "exposed messages",
-        "load imbalance", "critical path", "task lengths", "sweep", "efficiency"})
+        "load imbalance", "critical path", "task lengths", "\n  sweep ", "efficiency"})
     EXPECT_NE(show.output.find(word), std::string::npos) << word << " is missing in\n" << show.output;
   for (const char* format : {"perfetto", "paje", "svg"}) {
     const Outcome exported =
