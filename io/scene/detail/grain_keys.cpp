@@ -25,7 +25,9 @@ std::vector<Key<RuleTimes>> rule_time_keys() {
           .or_else("the end of the run"),
       key<T>("interval", "s", not_negative,
              "Time between two occasions; 0: every step. Candidates are found anew whenever grains come or "
-             "go: a longer interval saves time where they do in every step.",
+             "go: a longer interval saves time where they do in every step. What falls due behind the last "
+             "occasion "
+             "before `until` does not come.",
              &T::interval)};
 }
 
