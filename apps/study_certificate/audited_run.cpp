@@ -70,6 +70,11 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
                            step.unexplained);
     return;
   }
+  if (!(step.shift <= 1)) {
+    step.judged = Judged::other_problem;
+    step.why = fmt::format("a grain is {:.1e} times as far as velocities and overlaps take it", step.shift);
+    return;
+  }
   ReferenceLimits own = limits;
   own.forces = slack_of_law * step.asked;
   own.forces_velocities = slack_of_velocities * step.asked;
@@ -127,6 +132,8 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       const StepProblem problem =
           rebuild_step({start.before, start.walls, loads, start.stage, bodies, scene.setup, start.stage_index,
                         start.before.time - stage_began});
+      step.shift =
+          unexplained_shift(problem, report.time_step, solver.overlap_correction, start.before, after);
       judge(problem, start, after, plan.limits, step);
       step.audit_seconds = seconds_since(audit_start);
       run.steps.push_back(std::move(step));

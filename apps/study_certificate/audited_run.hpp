@@ -16,8 +16,8 @@ enum class Judged {
   yes,            ///< found: the errors are those of the step
   no_reference,   ///< not found, or not to a tenth of what the step claims
   no_answer,      ///< there is none: walls close on grains that cannot get away
-  other_problem,  ///< the run has contacts that the audit does not, or other velocities than its impulses
-                  ///< give
+  other_problem,  ///< the run has contacts that the audit does not, other velocities than its impulses give,
+                  ///< or other places than its velocities
 };
 
 /// One step.
@@ -34,6 +34,7 @@ struct AuditedStep {
   Judged judged = Judged::no_reference;
   std::string why;           ///< where it is not judged
   double unexplained = 0;    ///< disagreement() of the run with the problem
+  double shift = 0;          ///< unexplained_shift(): beyond 1 it is another problem
   bool forces_known = true;  ///< where judged; else forces are over-determined, velocities are not
   TrueErrors errors;
   double residual = 0, uncertainty = 0;  ///< of the reference

@@ -237,4 +237,28 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;
 }
 
+double unexplained_shift(const StepProblem& problem, double h, double part, const Frame& before,
+                         const Frame& after) {
+  if (problem.cell.repeats) return 0;
+  const std::size_t grains = after.x.size();
+  std::vector<Vec3> moved;
+  double shift = 0, size = 0;
+  for (std::size_t k = 0; k < grains; ++k) {
+    moved.push_back(before.x[k] + h / 2 * (before.u[k] + after.u[k]));
+    shift = larger(shift, (after.x[k] - moved[k]).norm());
+    size = std::max(size, after.x[k].norm() + (moved[k] - before.x[k]).norm());
+  }
+  double overlaps = 0;
+  for (std::size_t i = 0; i < grains && part > 0; ++i) {
+    for (std::size_t j = 0; j < i; ++j)
+      overlaps += std::max(0.0, after.radius[i] + after.radius[j] - (moved[i] - moved[j]).norm());
+    for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
+      const double gap = problem.wall_normal[w].dot(moved[i]) - after.walls[w].position - after.radius[i];
+      overlaps += std::max(0.0, -gap);
+    }
+  }
+  constexpr double rounding = 1e-12;
+  return shift / (2 * part * overlaps + rounding * size);
+}
+
 }  // namespace talus::audit

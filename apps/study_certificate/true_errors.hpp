@@ -43,4 +43,10 @@ double disagreement(const StepProblem& problem, const StepEnd& end);
 /// `overlap_correction` shifts sets nothing in motion and does not count.
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
 
+/// Largest way of a grain that its velocities do not explain, |x+ - x- - h (u- + u+)/2|, over what may shift
+/// it: `part` (`overlap_correction`) of the overlaps that the velocities alone would leave, twice their sum,
+/// and rounding. Only between planes; 0 in a cell, where positions wrap. `h`: time step [s].
+double unexplained_shift(const StepProblem& problem, double h, double part, const Frame& before,
+                         const Frame& after);
+
 }  // namespace talus::audit
