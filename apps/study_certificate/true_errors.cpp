@@ -241,20 +241,24 @@ double unexplained_shift(const StepProblem& problem, double h, double part, cons
                          const Frame& after) {
   if (problem.cell.repeats) return 0;
   const std::size_t grains = after.x.size();
-  std::vector<Vec3> moved;
+  std::vector<Vec3> middle, moved;
   double shift = 0, size = 0;
   for (std::size_t k = 0; k < grains; ++k) {
-    moved.push_back(before.x[k] + h / 2 * (before.u[k] + after.u[k]));
+    middle.push_back(before.x[k] + h / 2 * before.u[k]);
+    moved.push_back(middle[k] + h / 2 * after.u[k]);
     shift = larger(shift, (after.x[k] - moved[k]).norm());
     size = std::max(size, after.x[k].norm() + (moved[k] - before.x[k]).norm());
   }
   double overlaps = 0;
   for (std::size_t i = 0; i < grains && part > 0; ++i) {
-    for (std::size_t j = 0; j < i; ++j)
-      overlaps += std::max(0.0, after.radius[i] + after.radius[j] - (moved[i] - moved[j]).norm());
+    for (std::size_t j = 0; j < i; ++j) {
+      const double least = std::min((middle[i] - middle[j]).norm(), (moved[i] - moved[j]).norm());
+      overlaps += std::max(0.0, after.radius[i] + after.radius[j] - least);
+    }
     for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
-      const double gap = problem.wall_normal[w].dot(moved[i]) - after.walls[w].position - after.radius[i];
-      overlaps += std::max(0.0, -gap);
+      const Vec3& n = problem.wall_normal[w];
+      const double end = after.walls[w].position, half = (before.walls[w].position + end) / 2;
+      overlaps += std::max(0.0, after.radius[i] - std::min(n.dot(middle[i]) - half, n.dot(moved[i]) - end));
     }
   }
   constexpr double rounding = 1e-12;

@@ -44,8 +44,9 @@ double disagreement(const StepProblem& problem, const StepEnd& end);
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
 
 /// Largest way of a grain that its velocities do not explain, |x+ - x- - h (u- + u+)/2|, over what may shift
-/// it: `part` (`overlap_correction`) of the overlaps that the velocities alone would leave, twice their sum,
-/// and rounding. Only between planes; 0 in a cell, where positions wrap. `h`: time step [s].
+/// it: `part` (`overlap_correction`) of the overlaps in the middle of the step, from where grains rebound, or
+/// that the velocities would leave at its end, twice their sum, and rounding. Only between planes; 0 in a
+/// cell, where positions wrap. `h`: time step [s].
 double unexplained_shift(const StepProblem& problem, double h, double part, const Frame& before,
                          const Frame& after);
 

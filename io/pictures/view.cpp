@@ -18,8 +18,12 @@ namespace {
 using Colour = std::array<double, 3>;
 using Tint = std::array<std::uint8_t, 3>;  ///< of a sample: there are millions
 
+/// The nearest whole number; std::lround is a call for each of millions of samples.
+std::uint8_t nearest(double tone) {
+  return static_cast<std::uint8_t>(tone + 0.5);
+}
 std::uint8_t tone(double part) {
-  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(part, 0.0, 1.0)));
+  return nearest(255 * std::clamp(part, 0.0, 1.0));
 }
 
 constexpr std::size_t samples = 2;  // per pixel and direction
@@ -130,22 +134,25 @@ class Canvas {
   /// Deussen 2006): gaps look deep. What is drawn later is left as it is. The depth around is that of pixels.
   void darken_gaps(double reach) {
     const std::size_t width = width_ / samples, height = height_ / samples;
-    const auto pixel = [&](std::size_t k) { return k / width_ / samples * width + k % width_ / samples; };
+    // Calls visit(sample, pixel) for the samples that something covers.
+    const auto each_covered = [&](const auto& visit) {
+      for (std::size_t y = 0, k = 0; y < height_; ++y)
+        for (std::size_t x = 0; x < width_; ++x, ++k)
+          if (depth_[k] > empty) visit(k, y / samples * width + x / samples);
+    };
     std::vector<float> around(width * height, 0.0F), weight(width * height, 0.0F);
-    for (std::size_t k = 0; k < depth_.size(); ++k)
-      if (depth_[k] > empty) around[pixel(k)] += depth_[k], weight[pixel(k)] += 1;
+    each_covered([&](std::size_t k, std::size_t pixel) { around[pixel] += depth_[k], weight[pixel] += 1; });
     const auto radius = static_cast<std::size_t>(std::clamp(reach / samples, 1.0, 30.0));
     for (int pass = 0; pass < 2; ++pass)
       for (std::vector<float>* of : {&around, &weight}) {
         blur(*of, width, height, 1, width, radius);
         blur(*of, height, width, width, 1, radius);
       }
-    for (std::size_t k = 0; k < depth_.size(); ++k) {
-      if (depth_[k] == empty) continue;
-      const double mean = double{around[pixel(k)]} / weight[pixel(k)];
+    each_covered([&](std::size_t k, std::size_t pixel) {
+      const double mean = double{around[pixel]} / weight[pixel];
       const double deep = std::clamp((mean - depth_[k]) / (2 * reach), 0.0, 1.0);
-      for (std::uint8_t& c : colour_[k]) c = static_cast<std::uint8_t>(std::lround(c * (1 - 0.6 * deep)));
-    }
+      for (std::uint8_t& c : colour_[k]) c = nearest(c * (1 - 0.6 * deep));
+    });
   }
 
   Image image() const {
@@ -154,11 +161,11 @@ class Canvas {
     for (std::size_t y = 0; y < out.height; ++y)
       for (std::size_t x = 0; x < out.width; ++x)
         for (std::size_t c = 0; c < 3; ++c) {
-          double sum = 0;
+          std::size_t sum = 0;
           for (std::size_t v = 0; v < samples; ++v)
             for (std::size_t u = 0; u < samples; ++u)
               sum += colour_[(y * samples + v) * width_ + x * samples + u][c];
-          out.rgb.push_back(static_cast<std::uint8_t>(std::lround(sum / (samples * samples))));
+          out.rgb.push_back(static_cast<std::uint8_t>((sum + samples * samples / 2) / (samples * samples)));
         }
     return out;
   }
