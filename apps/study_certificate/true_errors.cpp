@@ -21,6 +21,8 @@ struct Floors {
   double cluster = 1e-3;   ///< of a cluster's own momentum, likewise: grains that graze one another
   double rounding = 5;     ///< speeds that rounding of a position makes
   double row = 10;         ///< grains of a cluster beyond which their speeds add up to more
+  double place = 1e-12;    ///< of a grain's distance from the origin and its way: what rounding shifts it by
+  double undone = 2;       ///< of what is undone of all overlaps: how far that may shift a grain
 };
 constexpr Floors floors;
 
@@ -261,8 +263,7 @@ double unexplained_shift(const StepProblem& problem, double h, double part, cons
       overlaps += std::max(0.0, after.radius[i] - std::min(n.dot(middle[i]) - half, n.dot(moved[i]) - end));
     }
   }
-  constexpr double rounding = 1e-12;
-  return shift / (2 * part * overlaps + rounding * size);
+  return shift / (floors.undone * part * overlaps + floors.place * size);
 }
 
 }  // namespace talus::audit

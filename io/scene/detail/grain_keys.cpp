@@ -26,8 +26,7 @@ std::vector<Key<RuleTimes>> rule_time_keys() {
       key<T>("interval", "s", not_negative,
              "Time between two occasions; 0: every step. Candidates are found anew whenever grains come or "
              "go: a longer interval saves time where they do in every step. What falls due behind the last "
-             "occasion "
-             "before `until` does not come.",
+             "occasion before `until` does not come.",
              &T::interval)};
 }
 
