@@ -10,6 +10,7 @@
 
 #include "kernels/fields/lucy.hpp"
 #include "runtime/step/stressed_cell.hpp"
+#include "runtime/step/time_step.hpp"
 
 namespace talus {
 
@@ -32,11 +33,13 @@ void validate_flow(const Setup& setup, const Stage& stage) {
       refuse(fmt::format("shear_rates between {} and {}, which are not both periodic", "xyz"[pairs[k][0]],
                          "xyz"[pairs[k][1]]));
   }
-  constexpr double most = 0.1;  // strain of a step
-  const double step = stage.chooses_time_step ? stage.time_step_max : stage.time_step;
+  // A stage that chooses its steps chooses them by the rates, too.
+  const double most = TimeStepRule{}.longest_strain,
+               step = stage.chooses_time_step ? stage.time_step_min : stage.time_step;
   if (step * std::max(stage.strain_rates.cwiseAbs().maxCoeff(), stage.shear_rates.cwiseAbs().maxCoeff()) >
       most)
-    refuse(fmt::format("the cell is strained by more than {} in a step; make the time step shorter", most));
+    refuse(fmt::format("the cell is strained by more than {} in a step; make {} shorter", most,
+                       stage.chooses_time_step ? "time_step_min" : "the time step"));
 }
 
 /// Components that follow a stress: of a cell of spheres, between axes that repeat. Walls bound the others.

@@ -29,6 +29,12 @@ void StageMemory::add(const StageEnd& end, const StageStep& step) {
   // Sums of parts may fall short of 1 by their rounding.
   constexpr double whole = 1 - 1e-9;
   if (window < whole) return;
+  window = 0;
+  // Without a stress in any step, as before grains meet, nothing is said of a steady state.
+  if (sums[0] == 0) {
+    windows = weight = sums[1] = 0;
+    return;
+  }
   drift = 0;
   for (std::size_t k = 0; k < watched; ++k) {
     const double mean = sums[k] / weight;
@@ -37,7 +43,7 @@ void StageMemory::add(const StageEnd& end, const StageStep& step) {
     sums[k] = 0;
   }
   windows += 1;
-  window = weight = 0;
+  weight = 0;
 }
 
 StageDone stage_done(const Stage& stage, const StageProgress& progress) {

@@ -1,10 +1,12 @@
 #include "runtime/step/time_step.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include "kernels/detection/closing.hpp"
+#include "runtime/step/cell_flow.hpp"
 
 namespace talus {
 
@@ -47,6 +49,10 @@ double shortest_time(const StepState& state, const TimeStepRule& rule) {
   return period / rule.steps_of_period;
 }
 
+double inverse(double rate) {
+  return rate > 0 ? 1 / rate : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
 
 TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver, double smallest,
@@ -71,12 +77,23 @@ double longest_time_step(const StepState& state, const Setup& setup, const StepP
                      fastest(state)};
   ranks.max(rates);
   if (blind) rates[0] = 2 * rates[1] / near;
-  const auto inverse = [](double rate) {
-    return rate > 0 ? 1 / rate : std::numeric_limits<double>::infinity();
-  };
   return std::min({inverse(rates[0]), inverse(rates[1] / (rule.longest_way * smallest)),
                    std::sqrt(2 * unseen * inverse(acceleration_of(state, parameters))),
                    shortest_time(state, rule)});
+}
+
+double longest_step_of_flow(const StepState& state, const SolverSettings& solver,
+                            const StepParameters& parameters, double smallest, double reach,
+                            const TimeStepRule& rule) {
+  if (!state.domain.repeats) return std::numeric_limits<double>::infinity();
+  const Mat3& next = parameters.velocity_gradient;
+  constexpr std::array<Eigen::Index, 2> axes[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  Mat3 change = next - gradient_before(state.domain, 0);
+  for (std::size_t k = 0; k < cell_freedoms; ++k)
+    if (state.cell.follows[k]) change(axes[k][0], axes[k][1]) = 0;
+  const double unseen = unseen_overlap(solver, smallest, rule);
+  return std::min(rule.longest_strain * inverse(next.cwiseAbs().maxCoeff()),
+                  unseen * inverse(change.norm() * reach));
 }
 
 StageClock::StageClock(const TimeStepBounds& bounds, std::optional<double> end, double begin)

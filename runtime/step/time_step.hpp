@@ -26,6 +26,8 @@ struct TimeStepRule {
   /// Longest path of a body, or of a wall into the grains, in a step, in (0, 0.5]: candidates are known that
   /// far, and two bodies that overlap by more have passed one another (StepReport::passed).
   double longest_way = 0.5;
+  /// Largest strain of a periodic cell by its prescribed rates in a step, > 0.
+  double longest_strain = 0.1;
   /// Steps in a period of a wall that oscillates, at least; > 2, so that it is seen at all.
   double steps_of_period = 20;
   /// Ratio of the longest to the shortest time step where the scene gives no shortest one, >= 1.
@@ -47,6 +49,14 @@ TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver
 /// bodies and candidates.
 double longest_time_step(const StepState& state, const Setup& setup, const StepParameters& parameters,
                          double smallest, const graph::Communicator& ranks, const TimeStepRule& rule = {});
+
+/// The longest step that the prescribed flow of a periodic cell allows [s], infinity where nothing is
+/// prescribed. What a stage changes of it begins within the step, when it does not show in velocities yet:
+/// neighbours, `reach` apart at most [m], come nearer to one another by it as by overlaps that cannot be
+/// foreseen.
+double longest_step_of_flow(const StepState& state, const SolverSettings& solver,
+                            const StepParameters& parameters, double smallest, double reach,
+                            const TimeStepRule& rule = {});
 
 /// Time of a stage as a whole number of its shortest steps.
 class StageClock {

@@ -197,8 +197,7 @@ Section<StageEnd> stage_end_keys() {
                         "Path of the shear of the periodic cell since the beginning of the stage, with every "
                         "deviatoric rate "
                         "that it has, those that a stress makes among them: of simple shear at the rate g "
-                        "for a time t, "
-                        "g t.",
+                        "for a time t, g t less half a step's, as the flow begins within the first step.",
                         &StageEnd::shear_strain),
           key<StageEnd>(
               "equilibrium", "", positive,

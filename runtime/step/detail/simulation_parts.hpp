@@ -246,11 +246,19 @@ struct Simulation::Implementation {
     set_walls(setup, report.time, parameters.time_step, state);
     if (!stage().chooses_time_step) return;
     prepare_walls(report.time, parameters.time_step, step_before(), state, ranks);
-    double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
+    double longest = std::min(longest_time_step(state, setup, parameters, smallest_radius(), ranks),
+                              longest_step_of_flow(state, setup.solver, parameters, smallest_radius(),
+                                                   2 * largest_radius + parameters.alert));
     // Grains to be inserted in the step are not among the bodies yet.
     if (const double speed = population.fastest(span()); speed > 0)
       longest = std::min(longest, TimeStepRule{}.longest_way * smallest_radius() / speed);
     clock.choose(longest);
+    const double most = TimeStepRule{}.longest_strain;
+    if (clock.step() * parameters.velocity_gradient.cwiseAbs().maxCoeff() > most)
+      throw RunawayError(fmt::format(
+          "{}: the cell is strained by more than {} in the shortest step that is allowed, {:.3g} s; give a "
+          "shorter time_step_min",
+          next_step().text(), most, clock.step()));
     take_time_step(clock.step());
   }
 

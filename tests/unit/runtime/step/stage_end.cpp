@@ -212,5 +212,22 @@ TEST(SteadyState, WatchesTheSolidFractionOverThePathOfShear) {
   }
 }
 
+// Grains that have not met press nothing, and their cell keeps its volume: that is no steady state. A gas in
+// which they meet in few steps may have one.
+TEST(SteadyState, IsNotReachedBeforeAnythingPresses) {
+  talus::Stage stage;
+  stage.end.steady = 0.01;
+  stage.end.steady_time = 10;
+  const StageClock clock;
+  for (const int meeting : {0, 5}) {
+    StageMemory memory;
+    for (int k = 0; k < 100; ++k)
+      memory.add(
+          stage.end,
+          {.time_step = 1, .stress_ratio = meeting > 0 && k % meeting == 0 ? 0.3 : 0, .solid_fraction = 0.1});
+    EXPECT_EQ(stage_done(stage, {100, clock, 0, 0, 0, 0, memory}).fraction >= 1, meeting > 0);
+  }
+}
+
 }  // namespace
 }  // namespace talus::stage_end_test
