@@ -13,16 +13,17 @@ namespace {
 
 /// Floors of the units, as parts of other quantities of the step.
 struct Floors {
-  double walls = 1e-2;     ///< of the largest wall impulse: least momentum exchanged
-  double motion = 1e-9;    ///< of the momentum of all: less is rounding
-  double exchange = 1e-2;  ///< of the momentum exchanged: least wall impulse
-  double contact = 1e-3;   ///< likewise: least contact impulse
-  double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
-  double cluster = 1e-3;   ///< of a cluster's own momentum, likewise: grains that graze one another
-  double rounding = 5;     ///< speeds that rounding of a position makes
-  double row = 10;         ///< grains of a cluster beyond which their speeds add up to more
-  double place = 1e-12;    ///< of a grain's distance from the origin and its way: what rounding shifts it by
-  double undone = 2;       ///< of what is undone of all overlaps: how far that may shift a grain
+  double walls = 1e-2;      ///< of the largest wall impulse: least momentum exchanged
+  double motion = 1e-9;     ///< of the momentum of all: less is rounding
+  double exchange = 1e-2;   ///< of the momentum exchanged: least wall impulse
+  double contact = 1e-3;    ///< likewise: least contact impulse
+  double load = 1e-2;       ///< of a cluster's weight in a step: least momentum it exchanges
+  double cluster = 1e-3;    ///< of a cluster's own momentum, likewise: grains that graze one another
+  double rounding = 5;      ///< speeds that rounding of a position makes
+  double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
+  double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
+  double corrected = 1e-9;  ///< of a grain's radius: what a solve of overlaps that ends leaves of its changes
+  double undone = 2;        ///< of what is undone of all overlaps: how far that may shift a grain
 };
 constexpr Floors floors;
 
@@ -244,11 +245,12 @@ double unexplained_shift(const StepProblem& problem, double h, double part, cons
   if (problem.cell.repeats) return 0;
   const std::size_t grains = after.x.size();
   std::vector<Vec3> middle, moved;
-  double shift = 0, size = 0;
+  double shift = 0, size = 0, largest = 0;
   for (std::size_t k = 0; k < grains; ++k) {
     middle.push_back(before.x[k] + h / 2 * before.u[k]);
     moved.push_back(middle[k] + h / 2 * after.u[k]);
     shift = larger(shift, (after.x[k] - moved[k]).norm());
+    largest = std::max(largest, after.radius[k]);
     size = std::max(size, after.x[k].norm() + (moved[k] - before.x[k]).norm());
   }
   double overlaps = 0;
@@ -263,7 +265,7 @@ double unexplained_shift(const StepProblem& problem, double h, double part, cons
       overlaps += std::max(0.0, after.radius[i] - std::min(n.dot(middle[i]) - half, n.dot(moved[i]) - end));
     }
   }
-  return shift / (floors.undone * part * overlaps + floors.place * size);
+  return shift / (part * (floors.undone * overlaps + floors.corrected * largest) + floors.place * size);
 }
 
 }  // namespace talus::audit

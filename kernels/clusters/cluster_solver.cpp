@@ -151,7 +151,9 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
             ClusterAnswer& answer) {
   const double budget = (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) *
                         sweep_cost(blocks_of(problem), problem.contacts.size());
+  bool stuck = true;
   const auto take = [&](const Correction& correction) {
+    stuck = stuck && correction.stuck;
     ClusterAnswer other = answer_of(problem, problem, correction);
     if (other.solved || other.error < answer.error) answer = std::move(other);
   };
@@ -166,8 +168,10 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   if (!answer.solved)
     take(proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;
-  // A cell that follows a stress couples all contacts: the matrix would be full.
-  if (!answer.solved && !problem.has_cell()) solve_by_matrix(problem, goal.enough, left, thresholds, answer);
+  // A cell that follows a stress couples all contacts: the matrix would be full. And where steps of any kind
+  // press contacts against one another without end, these solvers would, too.
+  if (!answer.solved && !problem.has_cell() && !stuck)
+    solve_by_matrix(problem, goal.enough, left, thresholds, answer);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ struct ClusterThresholds {
   /// Budget of an answer that rounds do not find, in multiplications, those of sweeps over the cluster's
   /// stored matrix (sweep_cost): so many, >= 0, and so many for each sweep that the step has had, >= 0.
   /// Beyond it the cluster is left without an answer.
-  double least_budget = 20000, budget_per_sweep = 10;
+  double least_budget = 500, budget_per_sweep = 20;
   /// Parts of it that the question whether there is an answer, and the steps of coulomb_newton.hpp and
   /// proximal_newton.hpp may take, together in (0, 1); each has also what those before it leave.
   double admissible_share = 0.05, coulomb_share = 0.5, proximal_share = 0.4;

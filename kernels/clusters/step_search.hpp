@@ -30,6 +30,11 @@ struct SearchThresholds {
   /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
   /// And what further steps would change, by how the last two did, may be so many goals, >= 1.
   double firm_enough = 1e6, rest = 10;
+  /// With friction, steps of the greatest firmness, >= 1, that move nothing and leave more than this part,
+  /// in (0, 1), of what the law found wrong before them, after which no more follow: contacts press against
+  /// one another without end, as grains between walls that close on them and which friction keeps there.
+  int idle = 20;
+  double shrinks = 0.9;
 };
 
 /// Where a step begins, and what is asked of it.
@@ -71,8 +76,9 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
   const bool friction = has_friction(problem);
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
   std::vector<Vec3> impulse = best.impulse;
-  int wary = 0;
-  for (int k = 1; k <= search.most_steps && work > 0 && !best.settled; ++k) {
+  int wary = 0, idle = 0;
+  double open = 0;  // before the idle steps
+  for (int k = 1; k <= search.most_steps && work > 0 && !best.settled && idle < search.idle; ++k) {
     const std::vector<Twist> before = steps.motion();
     const double goal = goal_of(momentum_of(problem, before), asked.enough, thresholds);
     if (!steps.solve({firmness, goal, moved}, work)) {
@@ -108,12 +114,16 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
         if (steps.leap(work) > 0) last = std::numeric_limits<double>::infinity();
         impulse = steps.changes();
       }
+    const bool rests = friction && firmness >= thresholds.firmness && now.moved <= goal;
+    idle = rests && now.open > search.shrinks * open ? idle + 1 : 0;
+    if (idle == 0) open = now.open;
     if (wary > 0)
       --wary;
     else if (steps.firmer(small))
       firmness = std::min(search.growth * firmness, thresholds.firmness);
     if (now.settled || now.error() < best.error()) best = std::move(now);
   }
+  best.stuck = !best.settled && idle >= search.idle;
   return best;
 }
 

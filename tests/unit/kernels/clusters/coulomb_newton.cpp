@@ -168,6 +168,21 @@ TEST(CoulombSteps, SayWhatIsStillToCome) {
   EXPECT_GE(early, 6);
 }
 
+// Walls of a V that close on a grain drive it out, at 1/sin a times their speed; not where friction is more
+// than tan a. Impulses then grow without end: no search goes on for as many steps as it may.
+TEST(CoulombSteps, EndWhereFrictionKeepsAGrainBetweenClosingWalls) {
+  constexpr double a = 0.3;
+  for (const double mu : {0.5, 0.2}) {
+    BodyProblem problem = wedge(a, mu);
+    for (ContactEquation& contact : problem.contacts) contact.offset = -fall * contact.normal;
+    const bool kept = mu > std::tan(a);
+    const Correction answer = corrected(problem);
+    EXPECT_EQ(answer.stuck, kept) << mu;
+    EXPECT_EQ(answer.settled, !kept) << mu;
+    EXPECT_EQ(solve_cluster(problem, {.enough = enough, .relative = 1e-3}).solved, !kept) << mu;
+  }
+}
+
 TEST(CoulombSteps, KeepToTheirWorkAndSaySo) {
   const BodyProblem problem = wedge(0.3, 0.1);
   double work = 1;
