@@ -59,9 +59,10 @@ struct ClusterAnswer {
 /// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, and there may be an
 /// answer (admissible.hpp), proximal steps, with friction first those of coulomb_newton.hpp, then
 /// proximal_newton.hpp; and where these do not either, with what is left of the budget the solvers that keep
-/// W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there. All by
-/// counted work, so the same bits come out every time. The changed impulses lie on the cones. Values that are
-/// not finite come back as an error that is not.
+/// W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there; not
+/// where steps of all kinds were stuck (Correction::stuck). All by counted work, so the same bits come out
+/// every time. The changed impulses lie on the cones. Values that are not finite come back as an error that
+/// is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

@@ -77,7 +77,7 @@ struct Correction {
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
                          ///< changed next to nothing; and rounding leaves less than need not be known. Of
                          ///< proximal steps: further ones would change next to nothing
-  bool stuck = false;    ///< impulses of proximal steps grow, and move nothing: SearchThresholds::idle
+  bool stuck = false;  ///< proximal steps went on without moving or mending anything (SearchThresholds::idle)
 
   /// All of it [N s].
   double error() const { return found + uncertain(); }

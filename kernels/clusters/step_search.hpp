@@ -30,10 +30,11 @@ struct SearchThresholds {
   /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
   /// And what further steps would change, by how the last two did, may be so many goals, >= 1.
   double firm_enough = 1e6, rest = 10;
-  /// With friction, steps of the greatest firmness, >= 1, that move nothing and leave more than this part,
-  /// in (0, 1), of what the law found wrong before them, after which no more follow: contacts press against
-  /// one another without end, as grains between walls that close on them and which friction keeps there.
+  /// With friction a search ends after so many steps of the greatest firmness, >= 1, that move no more than
+  /// the goal and leave what the law finds wrong as it is: contacts are taken to press against one another
+  /// without end, as grains do between walls that close on them where friction keeps them.
   int idle = 20;
+  /// As it is: more than this part of it, in (0, 1), is left behind all of them.
   double shrinks = 0.9;
 };
 
@@ -77,7 +78,7 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
   std::vector<Vec3> impulse = best.impulse;
   int wary = 0, idle = 0;
-  double open = 0;  // before the idle steps
+  double open = std::numeric_limits<double>::infinity();  // before the idle steps
   for (int k = 1; k <= search.most_steps && work > 0 && !best.settled && idle < search.idle; ++k) {
     const std::vector<Twist> before = steps.motion();
     const double goal = goal_of(momentum_of(problem, before), asked.enough, thresholds);

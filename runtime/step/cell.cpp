@@ -34,11 +34,11 @@ void validate_flow(const Setup& setup, const Stage& stage) {
                          "xyz"[pairs[k][1]]));
   }
   // A stage that chooses its steps chooses them by the rates, too.
-  const double most = TimeStepRule{}.longest_strain,
-               step = stage.chooses_time_step ? stage.time_step_min : stage.time_step;
-  if (step * std::max(stage.strain_rates.cwiseAbs().maxCoeff(), stage.shear_rates.cwiseAbs().maxCoeff()) >
-      most)
-    refuse(fmt::format("the cell is strained by more than {} in a step; make {} shorter", most,
+  const double step = stage.chooses_time_step ? stage.time_step_min : stage.time_step;
+  if (strains_too_far(
+          std::max(stage.strain_rates.cwiseAbs().maxCoeff(), stage.shear_rates.cwiseAbs().maxCoeff()), step))
+    refuse(fmt::format("the cell is strained by more than {} in a step; make {} shorter",
+                       TimeStepRule{}.longest_strain,
                        stage.chooses_time_step ? "time_step_min" : "the time step"));
 }
 

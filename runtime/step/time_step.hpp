@@ -6,7 +6,8 @@
 /// machine.
 ///
 ///   StageClock clock(bounds, end, begin);  at the beginning of a stage
-///   clock.choose(longest_time_step(...));  before each step, which then takes clock.step()
+///   clock.choose(longest);                 before each step, which then takes clock.step(): the least of
+///                                          longest_time_step and longest_step_of_flow
 ///   clock.advance();                       after it
 
 #include <cstdint>
@@ -57,6 +58,12 @@ double longest_time_step(const StepState& state, const Setup& setup, const StepP
 double longest_step_of_flow(const StepState& state, const SolverSettings& solver,
                             const StepParameters& parameters, double smallest, double reach,
                             const TimeStepRule& rule = {});
+
+/// A largest rate [1/s] strains the cell in a step by more than that; not by what rounding adds.
+inline bool strains_too_far(double rate, double step, const TimeStepRule& rule = {}) {
+  constexpr double rounding = 1e-12;
+  return rate * step > (1 + rounding) * rule.longest_strain;
+}
 
 /// Time of a stage as a whole number of its shortest steps.
 class StageClock {

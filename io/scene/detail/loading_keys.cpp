@@ -197,7 +197,8 @@ Section<StageEnd> stage_end_keys() {
                         "Path of the shear of the periodic cell since the beginning of the stage, with every "
                         "deviatoric rate "
                         "that it has, those that a stress makes among them: of simple shear at the rate g "
-                        "for a time t, g t less half a step's, as the flow begins within the first step.",
+                        "for a time t, g t. (Where the flow begins from rest, within the first step, edges "
+                        "lean by half a step's shear less.)",
                         &StageEnd::shear_strain),
           key<StageEnd>(
               "equilibrium", "", positive,

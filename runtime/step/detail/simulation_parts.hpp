@@ -253,12 +253,11 @@ struct Simulation::Implementation {
     if (const double speed = population.fastest(span()); speed > 0)
       longest = std::min(longest, TimeStepRule{}.longest_way * smallest_radius() / speed);
     clock.choose(longest);
-    const double most = TimeStepRule{}.longest_strain;
-    if (clock.step() * parameters.velocity_gradient.cwiseAbs().maxCoeff() > most)
+    if (strains_too_far(parameters.velocity_gradient.cwiseAbs().maxCoeff(), clock.step()))
       throw RunawayError(fmt::format(
           "{}: the cell is strained by more than {} in the shortest step that is allowed, {:.3g} s; give a "
           "shorter time_step_min",
-          next_step().text(), most, clock.step()));
+          next_step().text(), TimeStepRule{}.longest_strain, clock.step()));
     take_time_step(clock.step());
   }
 

@@ -84,6 +84,7 @@ end = { steps = 1 }
   const std::string few = "run scene.toml --force --out results --set solver.max_iterations=5";
   const Outcome outcome = run(few);
   EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  // At least that, and more where the best of the rounds that did not settle would change more.
   EXPECT_GE(read_table(at("results/steps.csv")).number(0, "balance"), 1);
   EXPECT_NE(outcome.messages.find("in 1 step nothing is known"), std::string::npos) << outcome.messages;
   EXPECT_NE(outcome.messages.find("solver.direct_bodies = 0"), std::string::npos) << outcome.messages;
@@ -157,7 +158,7 @@ pictures = false
   ASSERT_EQ(steps.rows.size(), 40U);
   double sweeps = 0;
   for (std::size_t k = 0; k < steps.rows.size(); ++k) sweeps += steps.number(k, "iterations");
-  EXPECT_LE(sweeps, 40 * 50);
+  EXPECT_LE(sweeps, 40 * 50) << "36 a step were measured";
 }
 
 TEST_F(Tolerances, ThatMakeNoSenseAreRefused) {

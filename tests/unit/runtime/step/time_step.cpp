@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/graph/pretend_ranks.hpp"
+#include "runtime/step/runaway.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
@@ -250,6 +251,50 @@ TEST(ChosenTimeStep, IsShortEnoughForAFlowThatBegins) {
   EXPECT_LT(chosen.front(), chosen.back());
   EXPECT_GT(parted, 0.1 * rate * radius);
   EXPECT_NEAR(parted, parted_by_a_flow(rate, false, given), 0.3 * parted);
+}
+
+// A cell whose shear goes on has nothing to fear of a change; one whose shear begins, turns or stops has; and
+// components that follow a stress are not changed by the stage.
+TEST(ChosenTimeStep, IsBoundedByChangesOfAFlow) {
+  constexpr double rate = 2, reach = 3 * radius;
+  const SolverSettings solver;
+  StepState state;
+  StepParameters parameters;
+  const auto longest = [&] { return longest_step_of_flow(state, solver, parameters, radius, reach); };
+  EXPECT_EQ(longest(), infinity) << "there is no cell";
+  state.domain = periodic_domain(Vec3::Constant(10 * radius));
+  EXPECT_EQ(longest(), infinity) << "nothing flows";
+  parameters.velocity_gradient(0, 2) = rate;
+  const double unseen = TimeStepRule{}.part_of_tolerance * solver.overlap_tolerance * radius;
+  EXPECT_DOUBLE_EQ(longest(), unseen / (rate * reach)) << "it begins";
+  state.cell.follows[4] = true;
+  EXPECT_DOUBLE_EQ(longest(), 0.1 / rate) << "it follows a stress";
+  state.cell.follows[4] = false;
+  state.domain.rates.xz = rate * 10 * radius;
+  EXPECT_DOUBLE_EQ(longest(), 0.1 / rate) << "it goes on";
+  parameters.velocity_gradient(0, 2) = -rate;
+  EXPECT_NEAR(longest(), unseen / (2 * rate * reach), 1e-12) << "it turns";
+  parameters.velocity_gradient.setZero();
+  EXPECT_NEAR(longest(), unseen / (rate * reach), 1e-12) << "it stops";
+}
+
+TEST(ChosenTimeStep, IsRefusedWhereItMayNotBeShortEnoughForAFlow) {
+  graph::Executor executor({});
+  Bodies bodies;
+  add_ball(bodies, Vec3::Constant(5 * radius), Vec3::Zero());
+  talus::Setup setup;
+  setup.domain = periodic_domain(Vec3::Constant(10 * radius));
+  setup.stages.push_back(choosing(1e3, 0.5));
+  setup.stages[0].shear_rates = Vec3(0, 1, 0);
+  setup.stages[0].time_step_min = 0.2;
+  EXPECT_THROW(Simulation(setup, bodies, executor), std::invalid_argument);
+  setup.stages[0].time_step_min = 0.1;  // to the rounding
+  EXPECT_NO_THROW(Simulation(setup, bodies, executor));
+  // The shortest step that weak gravity asks for.
+  setup.stages[0].time_step_min = setup.stages[0].time_step_max = 0;
+  setup.stages[0].gravity = Vec3(0, 0, -1e-8);
+  Simulation late(setup, bodies, executor);
+  EXPECT_THROW(late.step(), RunawayError);
 }
 
 TEST(ChosenTimeStep, NeedsABoundWithoutGravity) {
