@@ -168,8 +168,8 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   if (!answer.solved)
     take(proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;
-  // A cell that follows a stress couples all contacts: the matrix would be full. And where steps of any kind
-  // press contacts against one another without end, these solvers would, too.
+  // A cell that follows a stress couples all contacts: the matrix would be full. And where steps of all
+  // kinds press contacts against one another without end, these solvers would, too.
   if (!answer.solved && !problem.has_cell() && !stuck)
     solve_by_matrix(problem, goal.enough, left, thresholds, answer);
 }

@@ -47,8 +47,7 @@ CellDrive drive_cell(const Setup& setup, const StageMoment& at, const StepParame
   CellDrive drive{.gradient = parameters.velocity_gradient};
   StressedCell& cell = state.cell;
   if (!cell.loaded()) return drive;
-  CellVelocity follows{}, gain{};
-  std::copy(cell.follows.begin(), cell.follows.end(), follows.begin());
+  CellVelocity gain{};
   // In the middle of the step, as the edges are.
   cell.aim = stress_aimed_at(setup, {at.stage, at.time + 0.5 * parameters.time_step});
   const CellVelocity kinetic = components_of(kinetic_moment(state, gradient_before(state.domain, 0), ranks));
@@ -58,7 +57,7 @@ CellDrive drive_cell(const Setup& setup, const StageMoment& at, const StepParame
         cell.follows[k] ? parameters.impulse_time() * (kinetic[k] - volume * cell.aim[k]) / cell.length : 0;
     gain[k] = cell.push[k] / (cell.mass * cell.length);
   }
-  drive.follows = gradient_of(follows, 1);
+  drive.follows = cell.followed();
   drive.gain = gradient_of(gain, 1);
   return drive;
 }

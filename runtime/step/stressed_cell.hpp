@@ -3,10 +3,12 @@
 /// A periodic cell of which some components of the flow follow a stress: one more body in the contact problem
 /// of the step (docs/theory.md, "Cells under stress"; kernels/bodies/cell_velocity.hpp).
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "kernels/bodies/cell_velocity.hpp"
 #include "kernels/bodies/index.hpp"
 #include "kernels/bodies/types.hpp"
 #include "kernels/sweeps/cell_copy.hpp"
@@ -34,6 +36,12 @@ struct StressedCell {
     for (const bool free : follows)
       if (free) return true;
     return false;
+  }
+  /// 1 where components of the velocity gradient follow a stress, 0 elsewhere.
+  Mat3 followed() const {
+    CellVelocity components{};
+    std::copy(follows.begin(), follows.end(), components.begin());
+    return gradient_of(components, 1);
   }
   /// 1/mass of each component, of a copy that is one of `copies`.
   CellVelocity inv_mass(double of_copies = 1) const {

@@ -86,10 +86,8 @@ double longest_step_of_flow(const StepState& state, const SolverSettings& solver
                             const TimeStepRule& rule) {
   if (!state.domain.repeats) return std::numeric_limits<double>::infinity();
   const Mat3& next = parameters.velocity_gradient;
-  CellVelocity follows{};
-  for (std::size_t k = 0; k < cell_freedoms; ++k) follows[k] = state.cell.follows[k] ? 1 : 0;
   const Mat3 change =
-      (gradient_of(follows, 1).array() > 0).select(Mat3::Zero(), next - gradient_before(state.domain, 0));
+      (state.cell.followed().array() > 0).select(Mat3::Zero(), next - gradient_before(state.domain, 0));
   const double unseen = unseen_overlap(solver, smallest, rule);
   return std::min(rule.longest_strain * inverse(next.cwiseAbs().maxCoeff()),
                   unseen * inverse(change.norm() * reach));

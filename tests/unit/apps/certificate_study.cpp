@@ -135,6 +135,13 @@ TEST(CertificateAudit, AsksWhetherGrainsAreWhereTheirVelocitiesAndOverlapsTakeTh
   EXPECT_GT(shift(0), 1) << "nobody has asked for it";
   after.x[1][0] += overlap;
   EXPECT_GT(shift(part), 1) << "more than is undone in a step";
+  // Where nothing overlaps, the rest of a solve that has ended: a billionth of a radius.
+  before.x[1][0] += radius;
+  after.x[1] = before.x[1] + h * before.u[1];
+  after.x[1][0] += part * 9e-10 * radius;
+  EXPECT_LT(shift(part), 1);
+  after.x[1][0] += radius * 1e-6;
+  EXPECT_GT(shift(part), 1);
 }
 
 TEST(CertificateScenes, OfASizeHaveSoManyTimesTheGrains) {
