@@ -129,11 +129,16 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       const Frame after = simulation.frame();
       std::vector<double> loads;
       for (const WallState& wall : simulation.state().wall_states) loads.push_back(wall.applied);
-      const StepProblem problem =
-          rebuild_step({start.before, start.walls, loads, start.stage, bodies, scene.setup, start.stage_index,
-                        start.before.time - stage_began});
-      step.shift =
-          unexplained_shift(problem, report.time_step, solver.overlap_correction, start.before, after);
+      const StepInput input{start.before,
+                            start.walls,
+                            loads,
+                            start.stage,
+                            bodies,
+                            scene.setup,
+                            start.stage_index,
+                            start.before.time - stage_began};
+      const StepProblem problem = rebuild_step(input);
+      step.shift = unexplained_shift(input, solver.overlap_correction, after);
       judge(problem, start, after, plan.limits, step);
       step.audit_seconds = seconds_since(audit_start);
       run.steps.push_back(std::move(step));

@@ -17,10 +17,12 @@ class SceneBench {
 
   Draws draws;
   MadeScene made;
-  double radius;     ///< [m] of a usual grain
-  double gravity;    ///< [m/s^2] along -z; 0 for scenes in flight
-  double speed = 0;  ///< [m/s] that grains have at the beginning
-  int size;          ///< MakerSettings::size
+  double radius;          ///< [m] of a usual grain
+  double gravity;         ///< [m/s^2] along -z; 0 for scenes in flight
+  double speed = 0;       ///< [m/s] that grains have at the beginning
+  double wall_speed = 0;  ///< [m/s] of walls that move by themselves, the largest
+  double cohesion = 0;    ///< [N] of all pairs
+  int size;               ///< MakerSettings::size
   int steps;
   /// Of a cell: flow, stress and time step of the first stage, and of the second one, behind a change of
   /// loads. None between walls.
@@ -65,5 +67,11 @@ void make_arch(SceneBench& bench);
 void make_rows(SceneBench& bench);
 void make_heavy(SceneBench& bench);
 void make_cell(SceneBench& bench);
+void make_drum(SceneBench& bench);
+void make_hopper(SceneBench& bench);
+void make_paddle(SceneBench& bench);
+void make_mesh_drum(SceneBench& bench);
+void make_shaken(SceneBench& bench);
+void make_sticky(SceneBench& bench);
 
 }  // namespace talus::audit

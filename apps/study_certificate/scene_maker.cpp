@@ -9,6 +9,7 @@
 
 #include "apps/study_certificate/scene_bench.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/files/stl.hpp"
 #include "io/scene/bodies_file.hpp"
 
 namespace talus::audit {
@@ -29,11 +30,17 @@ constexpr std::array families = {
     SceneFamily{"arch", "an arch, and loose grains", make_arch},
     SceneFamily{"rows", "rows of touching grains that run into one another", make_rows},
     SceneFamily{"heavy", "heavy bodies on light ones", make_heavy},
-    SceneFamily{"cell", "grains in a periodic cell that follows a stress or a flow", make_cell}};
+    SceneFamily{"cell", "grains in a periodic cell that follows a stress or a flow", make_cell},
+    SceneFamily{"drum", "grains in a drum that turns or shakes", make_drum},
+    SceneFamily{"hopper", "grains in a cone under a tube, which may turn or shake", make_hopper},
+    SceneFamily{"paddle", "a plate, disc, rod or cone that moves among grains in a box", make_paddle},
+    SceneFamily{"mesh", "grains in a prism of triangles that moves, around a block of them", make_mesh_drum},
+    SceneFamily{"shaken", "grains in a box whose walls tilt, shake or run as belts", make_shaken},
+    SceneFamily{"sticky", "grains that hold one another and their walls", make_sticky}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;
-  double fastest = 0;
+  double fastest = bench.wall_speed;
   for (const auto& v : bench.made.grains.velocity) fastest = std::max(fastest, Vec3(v[0], v[1], v[2]).norm());
   const double fall = bench.gravity > 0 ? std::sqrt(bench.radius / bench.gravity) : INFINITY;
   const double flight = fastest > 0 ? bench.radius / fastest : INFINITY;
@@ -83,6 +90,7 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   const double at_walls = draws.chance(0.7) ? friction : 0;
   const double restitution = draws.chance(0.6) ? 0 : draws.chance(0.2) ? 1 : draws.unit();
   stage.laws = laws_of_one_material(friction, at_walls, restitution);
+  if (bench.cohesion > 0) stage.laws.set_all(cohesion_attraction, bench.cohesion);
   scene.common = stage;
   const bool changes = draws.chance(0.5) && settings.steps > 1;
   const int first = changes ? settings.steps / 2 : settings.steps;
@@ -135,6 +143,12 @@ MadeScene make_scene(std::string_view family, std::uint64_t seed, const MakerSet
 
 void keep_scene(const MadeScene& made, const std::filesystem::path& directory) {
   io::write_bodies(directory / made.scene.samples.front().file, made.grains);
+  for (const Wall& wall : made.scene.setup.walls) {
+    if (wall.shape.name != "mesh") continue;
+    std::vector<Triangle> triangles;
+    wall.surface()->show(triangles);
+    io::write_whole(directory / wall.shape.values.file, io::stl_text(triangles));
+  }
   io::write_whole(directory / (made.scene.name + ".toml"), io::resolved_scene(made.scene));
 }
 

@@ -9,6 +9,7 @@
 #include <map>
 #include <stdexcept>
 #include <unordered_map>
+#include <vector>
 
 namespace talus::audit {
 
@@ -26,15 +27,22 @@ struct Approach {
   double v_free;  ///< at its end without contacts [m/s]
 };
 
-/// Whether the pair is a contact; then its bias (docs/theory.md, "Gap term and restitution").
-bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double& bias) {
+/// Bodies that attract one another touch up to this gap, over the smaller radius.
+constexpr double reach_of_cohesion = 1e-3;
+
+/// Normals of one contact, in the frame's and in the problem's words, differ by less: 1 - cos.
+constexpr double one_normal = 1e-9;
+
+/// Whether the pair is a contact; then its bias (docs/theory.md, "Gap term and restitution"). `reach` [m] of
+/// cohesion.
+bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double reach, double& bias) {
   if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
   bias = std::max(0.0, pair.gap) / numbers.h;
   if (restitution > 0 && std::abs(pair.v_n) > numbers.slow) {
     const bool closes = pair.v_n < 0 && pair.gap + numbers.h * pair.v_free < 0;
     if (pair.gap <= 0 || (closes && pair.gap < numbers.turning))
       bias = restitution * pair.v_n;
-    else if (closes || restitution >= 1)
+    else if (closes || (restitution >= 1 && pair.gap > reach))
       return false;
   }
   // Moreau's law: of the mean velocity (v + E v-)/(1 + E).
@@ -69,6 +77,7 @@ class Builder {
     else
       meet_grains();
     meet_walls();
+    pull_together();
     return std::move(made_);
   }
 
@@ -100,9 +109,11 @@ class Builder {
       made_.wall_normal.push_back(wall.normal);
       made_.wall_inv_mass.push_back(wall.inv_mass());
       made_.wall_load.push_back(in_.loads[w]);
-      made_.free.walls.push_back(wall.velocity + gain * wall.normal);
+      made_.free.walls.push_back(wall.motion.empty() ? Vec3(wall.velocity + gain * wall.normal)
+                                                     : Vec3(Vec3::Zero()));
       if (wall.load.drive == WallDrive::velocity)
         made_.drive_speed = std::max(made_.drive_speed, wall.velocity.norm());
+      made_.walls_move = made_.walls_move || (!wall.absent && !wall.motion.empty());
     }
   }
 
@@ -128,13 +139,28 @@ class Builder {
     const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3(Vec3::UnitZ());
     const double v_n = normal.dot(in_.before.u[i] - in_.before.u[j] - cell.rates * k);
     const PairLaw& pair = law(material_[i], material_[j]);
+    const double gap = distance - in_.before.radius[i] - in_.before.radius[j];
+    const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
     double bias = 0;
-    if (!meets(numbers_, {distance - in_.before.radius[i] - in_.before.radius[j], v_n, v_n}, pair.restitution,
-               bias))
-      return;
+    if (!meets(numbers_, {gap, v_n, v_n}, pair.restitution, held.reach, bias)) return;
     const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
-    made_.contacts.push_back(
-        {i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction, drift, d / cell.length});
+    made_.contacts.push_back({i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction, drift,
+                              d / cell.length, gap <= held.reach ? acts_ * held.force : 0});
+  }
+
+  /// How a pair is held together: by so much [N] up to that gap [m].
+  struct Holding {
+    double force = 0, reach = 0;
+  };
+  static Holding holding(const PairLaw& pair, double radius, double other) {
+    const double force = pair.cohesion_of({radius, other});
+    return {force, force > 0 ? reach_of_cohesion * std::min(radius, other) : 0};
+  }
+
+  /// Cohesion is a given force: it belongs to what happens without contacts.
+  void pull_together() {
+    for (const StepContact& contact : made_.contacts)
+      if (contact.pull > 0) add_impulse(made_, contact, -contact.pull * contact.normal, made_.free);
   }
 
   /// All pairs of a cell: an image may be anywhere.
@@ -167,23 +193,35 @@ class Builder {
 
   void meet_walls() {
     for (std::size_t w = 0; w < in_.walls.size(); ++w) {
-      const Wall& wall = in_.walls[w];
-      const Vec3 middle = wall.point + numbers_.h / 2 * wall.velocity;
-      // Of the whole step: free velocities of the problem are the mean ones of an impact.
-      const Vec3 gained = numbers_.h * (in_.stage.gravity - in_.loads[w] * wall.inv_mass() * wall.normal);
-      for (std::size_t i = 0; i < n_; ++i) {
-        const PairLaw& pair = law(material_[i], wall.material);
-        const Approach approach{wall.normal.dot(middle_[i] - middle) - in_.before.radius[i],
-                                wall.normal.dot(in_.before.u[i] - wall.velocity),
-                                wall.normal.dot(in_.before.u[i] - wall.velocity + gained)};
-        double bias = 0;
-        if (!meets(numbers_, approach, pair.restitution, bias)) continue;
-        // In a cell the material of a wall goes with the flow, in its plane.
-        const StepCell& cell = made_.cell;
-        const Vec3 drift = (cell.before + cell.gain) * (middle_[i] - cell.low);
-        made_.contacts.push_back(
-            {i, -1 - static_cast<std::ptrdiff_t>(w), wall.normal, bias, pair.friction, drift});
-      }
+      const StepWall wall(in_.walls[w], in_.before.time);
+      if (!wall.there()) continue;
+      const Placement middle = wall.placed(numbers_.h / 2);
+      for (std::size_t i = 0; i < n_; ++i) meet_wall(wall, w, middle, i);
+    }
+  }
+
+  void meet_wall(const StepWall& wall, std::size_t w, const Placement& middle, std::size_t i) {
+    const PairLaw& pair = law(material_[i], in_.walls[w].material);
+    const double radius = in_.before.radius[i];
+    const Holding held = holding(pair, radius, INFINITY);
+    // Of the whole step: free velocities of the problem are the mean ones of an impact.
+    const Vec3 gained =
+        numbers_.h * (in_.stage.gravity - in_.loads[w] * in_.walls[w].inv_mass() * in_.walls[w].normal);
+    const Vec3 apart = in_.before.u[i] - (wall.moves() ? Vec3(Vec3::Zero()) : in_.walls[w].velocity);
+    const double speed = apart.norm() + gained.norm() + wall.speed_near(middle_[i], radius, numbers_.h);
+    for (const Touch& touch :
+         wall.touches(middle_[i], radius + numbers_.alert + numbers_.h * speed, middle)) {
+      const Vec3 point = middle_[i] - radius * touch.normal;
+      Vec3 drift = wall.material_velocity(point, touch.normal, numbers_.h);
+      const double gap = touch.distance - radius, v_n = touch.normal.dot(apart - drift);
+      double bias = 0;
+      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained)}, pair.restitution, held.reach, bias))
+        continue;
+      if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, drift.norm());
+      // In a cell the material of a wall goes with the flow, in its plane.
+      drift += (made_.cell.before + made_.cell.gain) * (middle_[i] - made_.cell.low);
+      made_.contacts.push_back({i, -1 - static_cast<std::ptrdiff_t>(w), touch.normal, bias, pair.friction,
+                                drift, Vec3::Zero(), gap <= held.reach ? acts_ * held.force : 0});
     }
   }
 
@@ -207,15 +245,11 @@ void demand_audited(const Setup& setup) {
     throw std::invalid_argument("the audit knows " + what + "; give it other scenes");
   };
   if (!setup.clumps.empty()) refuse("spheres only, no clumps");
-  if (!setup.inserts.empty()) refuse("no grains that are inserted");
-  for (const Wall& wall : setup.walls) {
-    if (wall.surface() != nullptr) refuse("plane walls only; '" + wall.name + "' is none");
-    if (!wall.motion.empty() || !wall.from_stage.empty() || !wall.until_stage.empty())
-      refuse("no walls that move by themselves, come or go: '" + wall.name + "'");
-  }
+  if (!setup.inserts.empty() || !setup.removes.empty()) refuse("no grains that are inserted or removed");
+  for (const Wall& wall : setup.walls)
+    if (!knows_shape(wall.shape.name)) refuse("no wall like '" + wall.name + "', a " + wall.shape.name);
   for (const Stage& stage : setup.stages)
-    if (stage.laws.attract() || stage.laws.largest(&PairLaw::rolling_resistance) > 0)
-      refuse("neither cohesion nor rolling resistance");
+    if (stage.laws.largest(&PairLaw::rolling_resistance) > 0) refuse("no rolling resistance");
 }
 
 StepProblem rebuild_step(const StepInput& input) {
@@ -257,17 +291,31 @@ Vec3 relative_velocity(const StepContact& contact, const Motion& motion) {
 
 double speed_of_bodies(const StepProblem& problem, const StepContact& contact) {
   const Motion& free = problem.free;
-  const Vec3& other = contact.at_wall() ? free.walls[contact.wall()] : free.u[contact.other()];
-  return free.u[contact.first].norm() + other.norm();
+  const double other =
+      contact.at_wall() ? free.walls[contact.wall()].norm() + (problem.walls_move ? contact.drift.norm() : 0)
+                        : free.u[contact.other()].norm();
+  return free.u[contact.first].norm() + other;
 }
 
+namespace {
+
+/// A contact of a frame: what acts on the first of two ids, with the normal from the second to it.
+struct FrameContact {
+  Vec3 normal, impulse;
+  bool known;
+};
+
+}  // namespace
+
 RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
-  std::map<std::array<std::int64_t, 2>, std::pair<Vec3, bool>> found;
+  std::map<std::array<std::int64_t, 2>, std::vector<FrameContact>> found;
   for (std::size_t k = 0; k < after.contact_bodies.size(); ++k) {
     auto [a, b] = after.contact_bodies[k];
-    Vec3 r = problem.time_step * after.contact_force[k];
-    if (b >= 0 && a < b) std::swap(a, b), r = -r;
-    found[{a, b}] = {r, false};
+    const bool turned = b >= 0 && a < b;
+    if (turned) std::swap(a, b);
+    const double sign = turned ? -1 : 1;
+    found[{a, b}].push_back(
+        {sign * after.contact_normal[k], sign * problem.time_step * after.contact_force[k], false});
   }
   RunImpulses all;
   for (const StepContact& contact : problem.contacts) {
@@ -275,13 +323,17 @@ RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
                  b = contact.at_wall() ? contact.second : after.id[contact.other()];
     const bool turned = !contact.at_wall() && a < b;
     if (turned) std::swap(a, b);
-    const auto entry = found.find({a, b});
-    all.r.push_back(Vec3::Zero());
-    if (entry == found.end()) continue;
-    all.r.back() = turned ? Vec3(-entry->second.first) : entry->second.first;
-    entry->second.second = true;
+    const double sign = turned ? -1 : 1;
+    all.r.push_back(contact.pull * contact.normal);
+    for (FrameContact& entry : found[{a, b}]) {
+      if (entry.known || !(entry.normal.dot(sign * contact.normal) > 1 - one_normal)) continue;
+      all.r.back() = sign * entry.impulse + contact.pull * contact.normal;
+      entry.known = true;
+      break;
+    }
   }
-  for (const auto& [ids, entry] : found) all.unknown += entry.second ? 0 : 1;
+  for (const auto& [ids, entries] : found)
+    all.unknown += static_cast<std::size_t>(std::ranges::count(entries, false, &FrameContact::known));
   return all;
 }
 

@@ -10,21 +10,27 @@
 #include <vector>
 
 #include "apps/study_certificate/step_cell.hpp"
+#include "apps/study_certificate/step_walls.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::audit {
 
-/// A pair that may exchange an impulse r [N s], which acts on `first`, and -r on `second`.
+/// A pair that may exchange an impulse r [N s], which acts on `first`, and -r on `second`. A grain may touch
+/// a wall in several places.
 struct StepContact {
   std::size_t first = 0;       ///< grain, its place in the frame
   std::ptrdiff_t second = 0;   ///< grain, or -(1 + wall)
   Vec3 normal = Vec3::Zero();  ///< unit, from the second to the first
   double bias = 0;             ///< b [m/s]: 0 <= v_n + b, perpendicular to r_n >= 0
   double friction = 0;         ///< mu
-  Vec3 drift = Vec3::Zero();   ///< [m/s] of the second's image beyond it, or of a wall that a cell stretches
+  /// [m/s] of the second's image beyond it, or of the material of a wall that a cell stretches or that moves
+  /// by itself.
+  Vec3 drift = Vec3::Zero();
   /// From the second to the first, over the d of the cell; 0 at walls, which do not push it.
   Vec3 branch = Vec3::Zero();
+  /// [N s] that cohesion holds with: the law is that of r + pull n, and free motion has -pull n.
+  double pull = 0;
 
   bool at_wall() const { return second < 0; }
   std::size_t wall() const { return static_cast<std::size_t>(-1 - second); }
@@ -38,7 +44,7 @@ struct Motion {
   CellVector cell = CellVector::Zero();
 };
 
-/// n grains in the order of the frame, k walls (planes, which move along their normals only where pushed).
+/// n grains in the order of the frame, k walls (of which planes move along their normals where pushed).
 struct StepProblem {
   double time_step = 0;               ///< loads act so long on the velocities that are found: h/(1 + E) [s]
   double reflection = 0;              ///< E of Moreau's law: those are (V + E V-)/(1 + E)
@@ -50,8 +56,11 @@ struct StepProblem {
   std::vector<double> wall_inv_mass;  ///< k [1/kg]; 0: fixed or driven
   std::vector<double> wall_load;      ///< k [N]
   StepCell cell;                      ///< one more body where it follows a stress
-  double drive_speed = 0;             ///< largest of the driven walls, or of a cell's flow [m/s]
-  double rounding_speed = 0;          ///< what rounding of positions is worth in a step [m/s]
+  /// Largest of the driven walls, of the material of those that move by themselves where it meets a grain,
+  /// or of a cell's flow [m/s].
+  double drive_speed = 0;
+  bool walls_move = false;    ///< some by themselves
+  double rounding_speed = 0;  ///< what rounding of positions is worth in a step [m/s]
   std::vector<StepContact> contacts;
 
   bool smooth() const;  ///< no contact has friction
@@ -69,8 +78,8 @@ struct StepInput {
   double time = 0;                ///< since the stage began [s]
 };
 
-/// Throws std::invalid_argument for what there are no formulas for: clumps, walls other than planes or that
-/// move by themselves, come or go, grains that are inserted, cohesion, rolling resistance.
+/// Throws std::invalid_argument for what there are no formulas for: clumps, grains that are inserted or
+/// removed, rolling resistance.
 void demand_audited(const Setup& setup);
 
 /// Throws what demand_audited throws.
@@ -85,11 +94,12 @@ Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses);
 /// Relative velocity of a contact, u_1 - u_2 - (w_1 + w_2) x n - drift + U b [m/s].
 Vec3 relative_velocity(const StepContact& contact, const Motion& motion);
 
-/// Speed of both bodies without contacts [m/s], of which the relative velocity is a difference.
+/// Speed of both bodies without contacts [m/s], of which the relative velocity is a difference; of a wall
+/// that of its material.
 double speed_of_bodies(const StepProblem& problem, const StepContact& contact);
 
-/// The impulses [N s] that the run found, in the order of the problem's contacts; `unknown`: contacts with a
-/// force that the problem does not have.
+/// The impulses r + pull n [N s] that the run found, in the order of the problem's contacts, of several at
+/// one wall by their normals; `unknown`: contacts with a force that the problem does not have.
 struct RunImpulses {
   std::vector<Vec3> r;
   std::size_t unknown = 0;

@@ -32,10 +32,12 @@ Vec3 wall_velocity(const StepProblem& problem, const Frame& after, std::size_t w
   return after.walls[w].velocity * problem.wall_normal[w];
 }
 
-std::vector<Vec3> wall_impulses(const StepProblem& problem, std::span<const Vec3> r) {
+/// On walls; with `pressed` what the law speaks of, r + pull n.
+std::vector<Vec3> wall_impulses(const StepProblem& problem, std::span<const Vec3> r, bool pressed) {
   std::vector<Vec3> sum(problem.wall_normal.size(), Vec3::Zero());
   for (std::size_t c = 0; c < r.size(); ++c)
-    if (problem.contacts[c].at_wall()) sum[problem.contacts[c].wall()] += r[c];
+    if (const StepContact& contact = problem.contacts[c]; contact.at_wall())
+      sum[contact.wall()] += r[c] - (pressed ? 0 : contact.pull) * contact.normal;
   return sum;
 }
 
@@ -44,7 +46,8 @@ Mat3 face_impulses(const StepProblem& problem, std::span<const Vec3> r) {
   Mat3 sum = Mat3::Zero();
   if (!problem.cell.repeats) return sum;
   for (std::size_t c = 0; c < r.size(); ++c)
-    if (!problem.contacts[c].at_wall()) sum += r[c] * problem.contacts[c].branch.transpose();
+    if (const StepContact& contact = problem.contacts[c]; !contact.at_wall())
+      sum += (r[c] - contact.pull * contact.normal) * contact.branch.transpose();
   for (const Eigen::Index axis : {0, 1, 2})
     if (!problem.cell.repeats_along[static_cast<std::size_t>(axis)]) sum.col(axis).setZero();
   return sum;
@@ -167,10 +170,11 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   TrueErrors errors;
   const double h = problem.time_step;
-  const std::vector<Vec3> walls = wall_impulses(problem, reference.r);
+  const std::vector<Vec3> walls = wall_impulses(problem, reference.r, false),
+                          pressed = wall_impulses(problem, reference.r, true);
   double wall_unit = 0, wall_wrong = 0;
   for (std::size_t w = 0; w < walls.size(); ++w) {
-    wall_unit = std::max({wall_unit, walls[w].norm(), h * std::abs(problem.wall_load[w])});
+    wall_unit = std::max({wall_unit, pressed[w].norm(), h * std::abs(problem.wall_load[w])});
     wall_wrong = std::max(wall_wrong, (walls[w] - h * end.after.walls[w].force).norm());
   }
   const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
@@ -222,7 +226,8 @@ double disagreement(const StepProblem& problem, const StepEnd& end) {
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after) {
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w)
     if (problem.wall_inv_mass[w] > 0) return 0;
-  if (problem.drive_speed > 0 || problem.cell.repeats) return 0;
+  if (problem.drive_speed > 0 || problem.walls_move || problem.cell.repeats) return 0;
+  if (std::ranges::any_of(problem.contacts, [](const StepContact& one) { return one.pull > 0; })) return 0;
   double gained = 0, free = 0, fall = 0;
   const double h = problem.time_step * (1 + problem.reflection);
   const auto spin = [](const Frame& frame, std::size_t k) {
@@ -240,12 +245,13 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;
 }
 
-double unexplained_shift(const StepProblem& problem, double h, double part, const Frame& before,
-                         const Frame& after) {
-  if (problem.cell.repeats) return 0;
+double unexplained_shift(const StepInput& input, double part, const Frame& after) {
+  if (input.before.domain.repeats) return 0;
+  const Frame& before = input.before;
+  const double h = input.stage.time_step;
   const std::size_t grains = after.x.size();
   std::vector<Vec3> middle, moved;
-  double shift = 0, size = 0, largest = 0;
+  double shift = 0, size = 0, largest = 0, overlaps = 0;
   for (std::size_t k = 0; k < grains; ++k) {
     middle.push_back(before.x[k] + h / 2 * before.u[k]);
     moved.push_back(middle[k] + h / 2 * after.u[k]);
@@ -253,17 +259,22 @@ double unexplained_shift(const StepProblem& problem, double h, double part, cons
     largest = std::max(largest, after.radius[k]);
     size = std::max(size, after.x[k].norm() + (moved[k] - before.x[k]).norm());
   }
-  double overlaps = 0;
-  for (std::size_t i = 0; i < grains && part > 0; ++i) {
+  for (std::size_t i = 0; i < grains && part > 0; ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const double least = std::min((middle[i] - middle[j]).norm(), (moved[i] - moved[j]).norm());
       overlaps += std::max(0.0, after.radius[i] + after.radius[j] - least);
     }
-    for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
-      const Vec3& n = problem.wall_normal[w];
-      const double end = after.walls[w].position, half = (before.walls[w].position + end) / 2;
-      overlaps += std::max(0.0, after.radius[i] - std::min(n.dot(middle[i]) - half, n.dot(moved[i]) - end));
+  for (std::size_t w = 0; w < input.walls.size() && part > 0; ++w) {
+    const StepWall wall(input.walls[w], before.time);
+    if (!wall.there()) continue;
+    Placement half = wall.placed(h / 2), end = wall.placed(h);
+    if (!wall.moves()) {  // a load may have changed its speed
+      end.shift = (after.walls[w].position - before.walls[w].position) * input.walls[w].normal;
+      half.shift = end.shift / 2;
     }
+    for (std::size_t i = 0; i < grains; ++i)
+      overlaps += std::max(wall.overlap(middle[i], after.radius[i], half),
+                           wall.overlap(moved[i], after.radius[i], end));
   }
   return shift / (part * (floors.undone * overlaps + floors.corrected * largest) + floors.place * size);
 }

@@ -15,13 +15,14 @@ namespace talus::audit {
 /// driven flow over a diameter, gives to all.
 struct TrueErrors {
   double velocity = 0;  ///< V: sum m |u - u*| over E
-  /// wf: largest error of a wall's impulse over the largest wall impulse or load. The faces of a cell count
+  /// wf: largest error of a wall's impulse over the largest wall impulse or load (where cohesion holds grains
+  /// to walls, over that which it presses them with, too). The faces of a cell count
   /// as walls: sum r (x) b/d of all contacts, a column for each axis.
   double wall_force = 0;
   double contact_force = 0;  ///< cf: largest error of a contact's impulse over the largest contact impulse
   double cluster = 0;        ///< V of the connected cluster of contacts where it is largest
   double energy = 0;         ///< energy gained that neither loads nor the time step explain, over the kinetic
-                             ///< energy without contacts; 0 where walls move
+                             ///< energy without contacts; 0 where walls move and with cohesion
 };
 
 /// What a step ended with, as the run says.
@@ -45,9 +46,8 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
 
 /// Largest way of a grain that its velocities do not explain, |x+ - x- - h (u- + u+)/2|, over what may shift
 /// it: `part` (`overlap_correction`) of the overlaps in the middle of the step, from where grains rebound, or
-/// that the velocities would leave at its end, twice their sum, and rounding. Only between planes; 0 in a
-/// cell, where positions wrap. `h`: time step [s].
-double unexplained_shift(const StepProblem& problem, double h, double part, const Frame& before,
-                         const Frame& after);
+/// that the velocities would leave at its end, twice their sum, and rounding. 0 in a cell, where positions
+/// wrap. `input`: the step without what happens in it.
+double unexplained_shift(const StepInput& input, double part, const Frame& after);
 
 }  // namespace talus::audit

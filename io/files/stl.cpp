@@ -139,4 +139,14 @@ std::vector<Triangle> read_stl(const std::string& path) {
                               (bytes.size() - head) / record + 1, count_of(bytes), wanted, bytes.size()));
 }
 
+std::string stl_text(const std::vector<Triangle>& triangles) {
+  std::string text = "solid talus\n";
+  for (const Triangle& triangle : triangles) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const Vec3& p : triangle) text += fmt::format("vertex {} {} {}\n", p[0], p[1], p[2]);
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid\n";
+}
+
 }  // namespace talus::io

@@ -15,4 +15,7 @@ namespace talus::io {
 /// early, holds another word than is expected, or a coordinate that is not a finite number.
 std::vector<Triangle> read_stl(const std::string& path);
 
+/// The text of an STL file with these triangles, to the last bit [m].
+std::string stl_text(const std::vector<Triangle>& triangles);
+
 }  // namespace talus::io

@@ -1,8 +1,8 @@
 /// Walls that move by themselves, on several ranks and stopped in motion: same bits as on one, straight on.
 
+#include "io/files/stl.hpp"
 #include "tests/mpi/launcher.hpp"
 #include "tests/unit/mesh_makers.hpp"
-#include "tests/unit/stl_text.hpp"
 
 namespace talus::test {
 namespace {
@@ -99,7 +99,7 @@ class MotionsOnRanks : public OnRanks {
  protected:
   void SetUp() override {
     write(at("funnel.stl"),
-          stl_text(moved(funnel_mesh(0.03, 0.09, 0.06, 0.01, 16), Vec3(0.05, 0.05, -0.06))));
+          io::stl_text(moved(funnel_mesh(0.03, 0.09, 0.06, 0.01, 16), Vec3(0.05, 0.05, -0.06))));
     write(at("way.csv"), "t,vx,vy,vz,angle\n0,0,0,0,0\n0.1,0,0,0.05,0.02\n0.2,0,0,0,0.04\n");
     write(at("scene.toml"), moving_scene);
   }

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
+#include "io/files/stl.hpp"
 #include "tests/mpi/launcher.hpp"
 #include "tests/unit/mesh_makers.hpp"
-#include "tests/unit/stl_text.hpp"
 
 namespace talus::test {
 namespace {
@@ -60,7 +60,7 @@ class SurfacesOnRanks : public OnRanks {
   void SetUp() override {
     // Its grains stand above the funnel's mouth.
     write(at("funnel.stl"),
-          stl_text(moved(funnel_mesh(0.03, 0.09, 0.06, 0.01, 16), Vec3(0.05, 0.05, -0.06))));
+          io::stl_text(moved(funnel_mesh(0.03, 0.09, 0.06, 0.01, 16), Vec3(0.05, 0.05, -0.06))));
     write(at("scene.toml"), funnel_scene);
   }
 };

@@ -7,11 +7,11 @@
 #include <string>
 #include <utility>
 
+#include "io/files/stl.hpp"
 #include "io/scene/scene.hpp"
 #include "kernels/samples/sample.hpp"
 #include "tests/unit/io/scene/scene_text.hpp"
 #include "tests/unit/mesh_makers.hpp"
-#include "tests/unit/stl_text.hpp"
 
 namespace talus::io {
 namespace {
@@ -97,7 +97,7 @@ TEST(WallShapes, AGrainInsideASolidIsRefused) {
 
 TEST(WallShapes, AGrainDeepInTheSolidOfAMeshIsRefusedAndOneOnTheRightSideIsNot) {
   const std::string path = (std::filesystem::temp_directory_path() / "talus_wall_shapes_box.stl").string();
-  std::ofstream(path) << test::stl_text(test::box_mesh({0, 0, 0}, {1, 1, 1}, 2));
+  std::ofstream(path) << io::stl_text(test::box_mesh({0, 0, 0}, {1, 1, 1}, 2));
   const std::string mesh = "shape = \"mesh\"\nfile = \"" + path + "\"\n";
   Sample sample;
   sample.density = 2600;

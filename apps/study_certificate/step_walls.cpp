@@ -1,0 +1,172 @@
+#include "apps/study_certificate/step_walls.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include "apps/study_certificate/touch_shapes.hpp"
+
+namespace talus::audit {
+
+namespace {
+
+/// What a part of a motion has done at a time of the run.
+struct Done {
+  Vec3 shift = Vec3::Zero();  ///< [m]
+  double angle = 0;           ///< [rad]
+};
+
+/// By the rows of a table, t since the part began. Behind its end the last slope goes on.
+Done read_rows(const MotionTable& table, double t) {
+  Done done;
+  for (std::size_t k = 0; k + 1 < table.t.size(); ++k) {
+    const bool last = k + 2 == table.t.size();
+    const double span = table.t[k + 1] - table.t[k];
+    const double part = last ? (t - table.t[k]) / span : std::clamp((t - table.t[k]) / span, 0.0, 1.0);
+    if (part <= 0) break;
+    if (!table.velocity.empty())
+      done.shift +=
+          span * (part * table.velocity[k] + part * part / 2 * (table.velocity[k + 1] - table.velocity[k]));
+    else if (!table.shift.empty())
+      done.shift += part * (table.shift[k + 1] - table.shift[k]);
+    if (!table.angle.empty()) done.angle += part * (table.angle[k + 1] - table.angle[k]);
+  }
+  if (!table.angle.empty()) done.angle += table.angle.front();
+  return done;
+}
+
+Done done_by(const MotionPart& part, double time) {
+  const double t = std::max(0.0, std::min(time, part.end) - part.begin);
+  Done done;
+  switch (part.kind) {
+    case MotionPart::Kind::velocity:
+      done.shift = t * part.velocity;
+      break;
+    case MotionPart::Kind::rotation:
+      done.angle = t * part.rate;
+      break;
+    case MotionPart::Kind::oscillation:
+      done.shift = part.amplitude *
+                   (std::sin(2 * std::numbers::pi * part.frequency * t + part.phase) - std::sin(part.phase)) *
+                   part.direction;
+      break;
+    case MotionPart::Kind::table:
+      done = read_rows(*part.table, t);
+      break;
+  }
+  return done;
+}
+
+/// Turns about lines in space, one after the other, and behind them all shifts.
+Placement placed_by(const std::vector<MotionPart>& parts, double time) {
+  Placement place;
+  Vec3 shift = Vec3::Zero();
+  for (const MotionPart& part : parts) {
+    if (part.surface_only) continue;
+    const Done done = done_by(part, time);
+    shift += done.shift;
+    if (!part.turns()) continue;
+    const Mat3 turn = Eigen::AngleAxisd(done.angle, part.axis).toRotationMatrix();
+    place = {turn * place.turn, turn * (place.shift - part.point) + part.point};
+  }
+  place.shift += shift;
+  return place;
+}
+
+Mat3 cross_matrix(const Vec3& v) {
+  Mat3 cross;
+  cross << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  return cross;
+}
+
+/// A rigid velocity: origin + omega x c at a point c.
+struct Twist {
+  Vec3 origin, omega;
+};
+
+/// The one that carries a body from one place to another within h: the logarithm of the way between them.
+Twist twist_between(const Placement& from, const Placement& to, double h) {
+  const Mat3 turn = to.turn * from.turn.transpose();
+  const Vec3 shift = to.shift - turn * from.shift;
+  const Eigen::AngleAxisd rotation(turn);
+  const double angle = rotation.angle(), a2 = angle * angle;
+  const Vec3 phi = angle * rotation.axis();
+  // exp: shift = (1 + a [phi] + b [phi]^2) origin; series where the closed forms would cancel.
+  const bool small = angle < 1e-2;
+  const double a = small ? 0.5 - a2 / 24 + a2 * a2 / 720 : (1 - std::cos(angle)) / a2;
+  const double b = small ? 1.0 / 6 - a2 / 120 + a2 * a2 / 5040 : (angle - std::sin(angle)) / (a2 * angle);
+  const Mat3 cross = cross_matrix(phi);
+  const Mat3 exponential = Mat3::Identity() + a * cross + b * cross * cross;
+  return {exponential.inverse() * shift / h, phi / h};
+}
+
+}  // namespace
+
+StepWall::StepWall(const Wall& wall, double time) : wall_(wall), time_(time) {
+  if (!knows_shape(wall.shape.name))
+    throw std::invalid_argument("the audit knows no wall like '" + wall.name + "', a " + wall.shape.name);
+  if (wall.shape.name == "mesh") wall.surface()->show(triangles_);
+}
+
+Placement StepWall::placed(double later) const {
+  if (moves()) return placed_by(wall_.motion, time_ + later);
+  return {Mat3::Identity(), later * wall_.velocity};
+}
+
+std::vector<Touch> StepWall::touches(const Vec3& centre, double reach, const Placement& where) const {
+  std::vector<Touch> all;
+  if (wall_.surface() == nullptr) {
+    // Its point and normal have come along with its motion.
+    const Placement now = placed(0);
+    const Vec3 normal = where.turn * (now.turn.transpose() * wall_.normal);
+    all.push_back({normal.dot(centre - where.of(now.back(wall_.point))), normal});
+  } else {
+    all = touches_of(wall_.shape, triangles_, where.back(centre), reach);
+    for (Touch& touch : all) touch.normal = where.turn * touch.normal;
+  }
+  std::erase_if(all, [&](const Touch& touch) { return !(touch.distance < reach); });
+  return all;
+}
+
+Vec3 StepWall::material_velocity(const Vec3& point, const Vec3& normal, double h) const {
+  if (!moves()) return Vec3::Zero();
+  const Placement middle = placed(h / 2), next = placed(3 * h / 2);
+  const Twist twist = twist_between(middle, next, h);
+  const Vec3 rigid = twist.origin + twist.omega.cross(point);
+  Vec3 along = Vec3::Zero();
+  for (const MotionPart& part : wall_.motion) {
+    if (!part.surface_only) continue;
+    const Done then = done_by(part, time_ + h / 2), done = done_by(part, time_ + 3 * h / 2);
+    along += middle.turn * (done.shift - then.shift) / h;
+    if (part.turns()) {
+      const Vec3 omega = (done.angle - then.angle) / h * (middle.turn * part.axis);
+      along += omega.cross(point - middle.of(part.point));
+    }
+  }
+  return rigid + along - along.dot(normal) * normal;
+}
+
+double StepWall::speed_near(const Vec3& centre, double radius, double h) const {
+  const Vec3 at_centre = material_velocity(centre, Vec3::Zero(), h);
+  double speed = at_centre.norm();
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    const Vec3 beside = material_velocity(centre + radius * Vec3::Unit(axis), Vec3::Zero(), h);
+    speed += (beside - at_centre).norm();
+  }
+  return speed;
+}
+
+double StepWall::overlap(const Vec3& centre, double radius, const Placement& where) const {
+  double deepest = 0;
+  for (const Touch& touch : touches(centre, radius, where))
+    deepest = std::max(deepest, radius - touch.distance);
+  return deepest;
+}
+
+}  // namespace talus::audit
