@@ -73,5 +73,6 @@ void make_paddle(SceneBench& bench);
 void make_mesh_drum(SceneBench& bench);
 void make_shaken(SceneBench& bench);
 void make_sticky(SceneBench& bench);
+void make_apart(SceneBench& bench);
 
 }  // namespace talus::audit

@@ -171,4 +171,23 @@ void make_heavy(SceneBench& bench) {
   bench.drop(base * draws.between(0.3, 0.7), base * draws.between(0.3, 0.7), big, 0);
 }
 
+void make_apart(SceneBench& bench) {
+  Draws& draws = bench.draws;
+  const double kind = draws.unit();
+  if (kind < 0.4)
+    make_column(bench);
+  else if (kind < 0.7)
+    make_among(bench);
+  else
+    make_rows(bench);
+  const double r = bench.radius * draws.between_decades(0.5, 30);
+  const double fall = std::sqrt((bench.gravity > 0 ? bench.gravity : 9.81) * bench.radius);
+  const Vec3 u(fall * draws.between_decades(0.1, 1e3), 0, 0);
+  std::vector<Wall>& walls = bench.made.scene.setup.walls;
+  std::erase_if(walls, [](const Wall& wall) { return wall.name == "z+"; });  // a lid would be in their way
+  const Vec3 above(0, 0, bench.top() + 3 * r);
+  bench.add_moving(above - Vec3(r, 0, 0), r, u);
+  bench.add_moving(above + Vec3(r, 0, 0), r, -u);
+}
+
 }  // namespace talus::audit

@@ -36,7 +36,8 @@ constexpr std::array families = {
     SceneFamily{"paddle", "a plate, disc, rod or cone that moves among grains in a box", make_paddle},
     SceneFamily{"mesh", "grains in a prism of triangles that moves, around a block of them", make_mesh_drum},
     SceneFamily{"shaken", "grains in a box whose walls tilt, shake or run as belts", make_shaken},
-    SceneFamily{"sticky", "grains that hold one another and their walls", make_sticky}};
+    SceneFamily{"sticky", "grains that hold one another and their walls", make_sticky},
+    SceneFamily{"apart", "two grains that collide far above others, and much faster", make_apart}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;

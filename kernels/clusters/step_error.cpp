@@ -105,7 +105,7 @@ class Answers {
       const double still =
           rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
       scales_[c] =
-          std::max({scale_of(rows[c], thresholds_), thresholds_.interest * everywhere * share, still});
+          std::max({scale_of(rows[c], thresholds_), thresholds_.elsewhere * everywhere * share, still});
       noise_[c] = std::max(thresholds_.rounding * most_momentum(rows[c][mass], rows[c][incoming]), still);
       answers_[c] = solve_cluster(clusters_[c].problem,
                                   {goal.enough * scales_[c], goal.enough, goal.sweeps, goal.still},
@@ -172,13 +172,13 @@ class Answers {
   double largest_impulse(std::size_t c) const {
     return talus::largest_impulse(clusters_[c].problem, answers_[c].found);
   }
-  /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times
+  /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `elsewhere` times
   /// that of all, or what rounding leaves. How fast walls or a flow are says nothing of forces.
   double contact_error(std::size_t c, double most) const {
     double change = 0;
     for (const Vec3& by : answers_[c].found) change = larger(change, by.norm());
     if (change == 0) return 0;
-    return change / std::max({largest_impulse(c), thresholds_.interest * most, noise_[c]});
+    return change / std::max({largest_impulse(c), thresholds_.elsewhere * most, noise_[c]});
   }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least
   /// ErrorGoal::walls: the largest.

@@ -16,9 +16,13 @@ namespace talus {
 /// Every number that the estimates of this header depend on. Ratios have no unit.
 struct StepErrorThresholds {
   ClusterThresholds cluster;
-  /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them; and
-  /// of what all clusters do, per mass; and of the largest impulse of all, for those of its contacts.
+  /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them.
   double interest = BalanceThresholds{}.interest;
+  /// Of what all clusters do, per mass, in (0, 1): one that does less is measured by this part of it; and its
+  /// contacts by this part of the largest impulse of all. What
+  /// happens elsewhere in a step must not hide that a column at rest falls: a ball that hits the floor beside
+  /// it at 5 m/s does 5000 times as much, per mass.
+  double elsewhere = 1e-6;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = BalanceThresholds{}.rounding;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
@@ -63,8 +67,8 @@ struct ErrorGoal {
 /// The scale of a cluster is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
 /// it; or the speed of driven walls times its mass, if that is more; where no wall is driven, at least a
 /// hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed at rest gain
-/// nothing; never less than a hundredth of what all clusters do, by its share of the mass, nor than what
-/// rounding leaves of its own momentum.
+/// nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters do, by its
+/// share of the mass, nor than what rounding leaves of its own momentum.
 StepError step_error(std::span<const BodyProblem> parts, const PartLink& link, const ErrorGoal& goal,
                      const StepErrorThresholds& thresholds = {});
 /// The whole problem in one part.

@@ -51,6 +51,7 @@ inline const std::uint32_t* record_places(const ContactBody* bodies) {
 /// means nothing at a wall.
 struct Levers {
   Mat3 first = Mat3::Zero(), second = Mat3::Zero();
+  Vec3 arm = Vec3::Zero();  ///< from the first body's centre to where the impulse acts [m]
 };
 
 /// Contacts of one step. Chunk c has a place for each of its candidates. Its contacts stand at

@@ -99,7 +99,6 @@ WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_
   WallSums sums;
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
   const std::size_t end = begin + static_cast<std::size_t>(contacts.count[chunk]);
-  const Wall& wall = poses.walls[static_cast<std::size_t>(chunks.wall[chunk])];
   for (std::size_t k = begin; k < end; ++k) {
     if (!contacts.arm.empty()) {
       const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
@@ -109,11 +108,10 @@ WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_
     const Vec3 r = contact_impulse(contacts, k);
     if (r == Vec3::Zero()) continue;
     const auto i = static_cast<std::size_t>(contacts.first[k]);
-    const Vec3 point =
-        chunks.kind[chunk] == ChunkKind::blocks
-            ? touch_of(poses, contacts, k, &wall).point
-            : Vec3(poses.x[i] - measure.half_step * Eigen::Map<const Vec3>(measure.velocity[i].u) -
-                   poses.radius[i] * contact_normal(contacts, k));
+    const Vec3 arm = chunks.kind[chunk] == ChunkKind::blocks
+                         ? contacts.levers[k].arm
+                         : Vec3(-poses.radius[i] * contact_normal(contacts, k));
+    const Vec3 point = poses.x[i] - measure.half_step * Eigen::Map<const Vec3>(measure.velocity[i].u) + arm;
     sums.torque += poses.domain.separation(point, measure.about).cross(r);
     sums.drift += r.dot(drift_of(contacts, k));
   }

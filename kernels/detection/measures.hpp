@@ -59,9 +59,8 @@ struct WallMeasure {
   double half_step = 0;                ///< [s]
 };
 
-/// Sums of chunk `chunk`, which is at a wall, with the poses of the end of the step. Impulses act on spheres
-/// at their surface, along the normal from their centres in the middle of the step; on balls of clumps where
-/// these stand in `poses`.
+/// Sums of chunk `chunk`, which is at a wall, with the poses of the end of the step. Impulses act where the
+/// surfaces of balls stood in the middle of the step.
 WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
                       const WallMeasure& measure);
 

@@ -45,7 +45,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
   // Both arms lead to the same point, so that angular momentum is kept across a gap, too.
   const Vec3 between = in.domain.separation(in.x[at(pair.first)], in.x[at(pair.second)]);
   const Vec3 arm = touch.point - in.x[at(pair.first)];
-  meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between)};
+  meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between), arm};
   meeting.v = velocity_at(in, pair.first, meeting.levers.first) -
               velocity_at(in, pair.second, meeting.levers.second) -
               in.domain.image_velocity(in.x[at(pair.first)], in.x[at(pair.second)]);
@@ -58,7 +58,8 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   const Wall& wall = in.walls[at(pair.wall)];
   Meeting meeting{touch_wall(poses, wall, pair.body, pair.feature), {}, {}, {}, pair.body, -1 - pair.feature};
   const Touch& touch = meeting.touch;
-  meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[at(pair.body)]);
+  meeting.levers.arm = touch.point - in.x[at(pair.body)];
+  meeting.levers.first = lever_of(in, pair.body, meeting.levers.arm);
   meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity_at(touch.point);
   meeting.fall = in.time_step * in.gravity - wall.gain;
   if (wall.surface() != nullptr) {

@@ -128,7 +128,12 @@ TEST(CertificateAudit, AsksWhetherGrainsAreWhereTheirVelocitiesAndOverlapsTakeTh
   before.radius = {radius, radius};
   Frame after = before;
   for (Vec3& x : after.x) x += h * before.u[0];
-  const auto shift = [&](double given) { return unexplained_shift({}, h, given, before, after); };
+  Stage stage;
+  stage.time_step = h;
+  const Bodies bodies;
+  const talus::Setup setup;
+  const StepInput input{before, {}, {}, stage, bodies, setup};
+  const auto shift = [&](double given) { return unexplained_shift(input, given, after); };
   EXPECT_LT(shift(0), 1);
   after.x[1][0] += part * overlap;
   EXPECT_LT(shift(part), 1) << "that is what overlap_correction is for";
@@ -316,9 +321,8 @@ TEST(CertificateStudy, KnowsWhatItHasNoFormulasFor) {
   EXPECT_TRUE(known([](talus::Setup&) {}));
   EXPECT_FALSE(known([](talus::Setup& setup) { setup.clumps.emplace_back(); }));
   EXPECT_FALSE(known([](talus::Setup& setup) { setup.inserts.emplace_back(); }));
-  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().motion.emplace_back(); }));
-  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().from_stage = "later"; }));
-  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().until_stage = "later"; }));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.removes.emplace_back(); }));
+  EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().shape.name = "sphere"; }));
   EXPECT_FALSE(known(
       [](talus::Setup& setup) { setup.stages.back().laws.set_all(&PairLaw::rolling_resistance, 0.1); }));
 }
