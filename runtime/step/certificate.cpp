@@ -230,9 +230,9 @@ double Certificate::large_unbalance(WholeProblem& whole) {
 /// than that of their grains if they follow the fastest wall, move as fast as rounding makes them, or as a
 /// part of the impulse at a wall makes all. A wall lighter than the grains counts with their mass: it gains
 /// much energy by little momentum. Walls serve small clusters, too, and count by the share of the mass.
-double Certificate::exchanged_by_large() const {
+Certificate::LargeEnergy Certificate::exchanged_by_large() const {
   const double all = exchanged_.mass;
-  if (!(all > 0)) return 0;
+  if (!(all > 0)) return {};
   const double mass = std::max(0.0, all - exchanged_by_small_.mass);
   double of_walls = 0, pressed = 0;
   for (std::size_t w = 0; w < scales_.wall_inv_masses.size(); ++w) {
@@ -241,13 +241,22 @@ double Certificate::exchanged_by_large() const {
     pressed = std::max(pressed, impulse);
   }
   const double speed = std::max({scales_.drive, rounding_, thresholds_.interest * pressed / all});
-  return std::max(exchanged_.energy - exchanged_by_small_.energy + of_walls * mass / all,
-                  0.5 * mass * speed * speed);
+  return {exchanged_.energy - exchanged_by_small_.energy + of_walls * mass / all, 0.5 * mass * speed * speed};
 }
 
-/// What stands beside a large cluster must not hide its errors: of several the worst speaks.
+/// Small clusters hide what large ones do: where theirs is most of the energy, the rest is a difference of a
+/// sum of now and one of their last check; and nobody has told what part of the impulses at walls is theirs.
+bool Certificate::small_hide_large() const {
+  if (!(exchanged_by_small_.mass > 0)) return false;
+  const LargeEnergy large = exchanged_by_large();
+  return exchanged_by_small_.energy > thresholds_.hiding * exchanged_.energy || large.least > large.moved;
+}
+
+/// What stands beside a large cluster must not hide its errors: each is weighed by itself, and the worst
+/// speaks.
 double Certificate::relative_work(WholeProblem& whole) {
-  if (!whole.several_large_clusters()) return work_ > 0 ? work_ / exchanged_by_large() : 0;
+  if (!whole.several_large_clusters() && !small_hide_large())
+    return work_ > 0 ? work_ / exchanged_by_large().counts() : 0;
   if (work_at_ != result_.iterations) {
     work_at_ = result_.iterations;
     largest_work_ = whole.large_work(rounding_, thresholds_.interest);
@@ -264,7 +273,8 @@ Certificate::WorkEstimate Certificate::estimate_by_work(WholeProblem& whole) {
   if (memory.reuse().most * work <= tolerance) return {memory.reuse().most * work, true};
   const int done = result_.iterations;
   if (asked_at_ == done) return {asked_error_, true};
-  const double expected = memory.per_work({result_.contacts, exchanged_by_large()}, scales_.friction) * work;
+  const double expected =
+      memory.per_work({result_.contacts, exchanged_by_large().counts()}, scales_.friction) * work;
   // At the end of a step that is missed anyhow nothing more is asked.
   const bool stuck = (done >= settings_.max_iterations && result_.error_rms <= settings_.tolerance) ||
                      done >= std::max<double>(thresholds_.doubtful, thresholds_.doubt_again * asked_at_);
@@ -278,7 +288,7 @@ double Certificate::by_work(WholeProblem& whole) {
   VelocityErrorMemory& memory = whole.velocity_errors();
   asked_at_ = result_.iterations;
   asked_error_ = whole.large_error(thresholds_.velocity_resolution * velocity_tolerance());
-  memory.found({result_.contacts, exchanged_by_large()}, asked_error_, work);
+  memory.found({result_.contacts, exchanged_by_large().counts()}, asked_error_, work);
   asked_error_ = larger(asked_error_, memory.credible(scales_.friction) * work);
   return asked_error_;
 }

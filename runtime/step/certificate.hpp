@@ -81,6 +81,9 @@ struct CertificateThresholds {
   double interest = BalanceThresholds{}.interest;
   /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
   int settling = 50;
+  /// From this part of the energy that all contacts exchange on, in (0, 1), what small clusters exchange
+  /// hides what large ones do.
+  double hiding = 0.1;
   /// Small clusters are put right so often in a step, at most, >= 0: sweeps for others may carry them off
   /// again.
   int most_corrections = 10;
@@ -126,7 +129,7 @@ class WholeProblem {
   /// What small clusters may cost grows with `sweeps`, done in this step.
   virtual SmallError small_error(double enough, int sweeps) = 0;
   virtual double large_error(double enough) = 0;
-  /// Of several large clusters, the relative work of the contacts' errors where it is largest
+  /// Of large clusters, the relative work of the contacts' errors where it is largest
   /// (kernels/clusters/cluster_work.hpp). Grains are at least so fast [m/s], and get at least such a part of
   /// what presses a wall.
   virtual double large_work(double speed, double interest) = 0;
@@ -225,7 +228,13 @@ class Certificate {
   Verdict verdict_on(const CheckSums& sums, const Check& check, WholeProblem& whole);
   void measure(const CheckSums& sums);
   double velocity_tolerance() const { return settings_.velocity_allowed(scales_.friction); }
-  double exchanged_by_large() const;
+  /// Energy that large clusters exchange [J]: with their own motion, and what it counts as at least.
+  struct LargeEnergy {
+    double moved = 0, least = 0;
+    double counts() const { return std::max(moved, least); }
+  };
+  LargeEnergy exchanged_by_large() const;
+  bool small_hide_large() const;
   double relative_work(WholeProblem& whole);
   double drift() const;
   double wall_scale() const;

@@ -181,7 +181,8 @@ void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   groups_ = large_clusters_of(clusters, in_small_, graphs, *link_);
   large_ = groups_.count > 0 || twice;
   twice_ = twice;
-  if (groups_.count <= 1 && !twice) groups_ = {.of_body = {}, .count = groups_.count};  // nobody asks which
+  if (groups_.count <= 1 && !twice && !small_)
+    groups_ = {.of_body = {}, .count = groups_.count};  // nobody asks which
   if (!twice || !small_) return;
   // Small ones, which have their own answers, are one group more.
   for (std::size_t p = 0; p < groups_.of_body.size(); ++p)

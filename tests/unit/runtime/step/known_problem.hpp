@@ -29,7 +29,7 @@ class KnownProblem : public WholeProblem {
   double speed() const override { return 1; }
   bool small_clusters() override { return !small_errors_.empty(); }
   bool large_clusters() override { return true; }
-  bool several_large_clusters() override { return largest_work.has_value(); }
+  bool several_large_clusters() override { return several && largest_work.has_value(); }
   double large_work(double speed, double interest) override {
     floors = {speed, interest};
     return *largest_work;
@@ -50,7 +50,8 @@ class KnownProblem : public WholeProblem {
   std::size_t small_asked() const { return small_asked_; }
   bool jammed = false, mends = false;  ///< what small clusters are besides
   Exchanged exchanged;                 ///< by them
-  std::optional<double> largest_work;  ///< of several large clusters, where there are any
+  std::optional<double> largest_work;  ///< of large clusters, where one is to be weighed by itself
+  bool several = true;                 ///< of them
   ExchangeFloors floors;               ///< that it was last asked for with
 
  private:
