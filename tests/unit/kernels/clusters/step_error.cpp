@@ -51,6 +51,21 @@ TEST(StepError, OfAColumnIsNotHiddenByGrainsAtRestBesideIt) {
   EXPECT_NEAR(error.contact, 0.3, 1e-6);
 }
 
+// A ball that hit the floor at 5 m/s hid that a column beside it fell.
+TEST(StepError, OfAColumnIsNotHiddenByAFarFasterGrainBesideIt) {
+  BodyProblem problem;
+  add_column(problem, 50, 0, 0.7);
+  const std::int32_t grain = add_grain(problem, Vec3(9, 0, 0.01), 0);
+  BodyUnknown& ball = problem.bodies[static_cast<std::size_t>(grain)];
+  ball.free.u = Vec3(0, 0, -5000 * fall / ball.mass);
+  ball.mass *= 1e6;
+  add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
+  problem.impulse.back() = -ball.mass * ball.free.u;
+  const StepError error = step_error(problem, {.enough = 1e-4});
+  EXPECT_NEAR(error.velocity, 0.3 / 0.7, 1e-2);
+  EXPECT_NEAR(error.contact, 0.3, 1e-6);
+}
+
 /// Three grains in a row that fills a cell along x, which a pressure closes with `momentum`: impulses `part`
 /// of what they carry.
 BodyProblem row_in_a_cell(double momentum, double part) {
