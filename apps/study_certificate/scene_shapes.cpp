@@ -3,7 +3,9 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -29,7 +31,7 @@ double speed_of_fall(const SceneBench& bench) {
 double clearance(const std::vector<StepWall>& walls, const Vec3& x, double r) {
   double least = r;
   for (const StepWall& wall : walls)
-    for (const Touch& touch : wall.touches(x, 2 * r, wall.placed(0)))
+    for (const WallTouch& touch : wall.touches(x, 2 * r, wall.placed(0)))
       least = std::min(least, touch.distance - r);
   return least;
 }

@@ -11,6 +11,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "apps/study_certificate/touch_shapes.hpp"
+
 namespace talus::audit {
 
 namespace {
@@ -111,7 +113,7 @@ class Builder {
       made_.wall_load.push_back(in_.loads[w]);
       made_.free.walls.push_back(wall.motion.empty() ? Vec3(wall.velocity + gain * wall.normal)
                                                      : Vec3(Vec3::Zero()));
-      if (wall.load.drive == WallDrive::velocity)
+      if (!wall.absent && wall.load.drive == WallDrive::velocity)
         made_.drive_speed = std::max(made_.drive_speed, wall.velocity.norm());
       made_.walls_move = made_.walls_move || (!wall.absent && !wall.motion.empty());
     }
@@ -209,7 +211,7 @@ class Builder {
         numbers_.h * (in_.stage.gravity - in_.loads[w] * in_.walls[w].inv_mass() * in_.walls[w].normal);
     const Vec3 apart = in_.before.u[i] - (wall.moves() ? Vec3(Vec3::Zero()) : in_.walls[w].velocity);
     const double speed = apart.norm() + gained.norm() + wall.speed_near(middle_[i], radius, numbers_.h);
-    for (const Touch& touch :
+    for (const WallTouch& touch :
          wall.touches(middle_[i], radius + numbers_.alert + numbers_.h * speed, middle)) {
       const Vec3 point = middle_[i] - radius * touch.normal;
       Vec3 drift = wall.material_velocity(point, touch.normal, numbers_.h);

@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -119,8 +118,8 @@ Placement StepWall::placed(double later) const {
   return {Mat3::Identity(), later * wall_.velocity};
 }
 
-std::vector<Touch> StepWall::touches(const Vec3& centre, double reach, const Placement& where) const {
-  std::vector<Touch> all;
+std::vector<WallTouch> StepWall::touches(const Vec3& centre, double reach, const Placement& where) const {
+  std::vector<WallTouch> all;
   if (wall_.surface() == nullptr) {
     // Its point and normal have come along with its motion.
     const Placement now = placed(0);
@@ -128,9 +127,9 @@ std::vector<Touch> StepWall::touches(const Vec3& centre, double reach, const Pla
     all.push_back({normal.dot(centre - where.of(now.back(wall_.point))), normal});
   } else {
     all = touches_of(wall_.shape, triangles_, where.back(centre), reach);
-    for (Touch& touch : all) touch.normal = where.turn * touch.normal;
+    for (WallTouch& touch : all) touch.normal = where.turn * touch.normal;
   }
-  std::erase_if(all, [&](const Touch& touch) { return !(touch.distance < reach); });
+  std::erase_if(all, [&](const WallTouch& touch) { return !(touch.distance < reach); });
   return all;
 }
 
@@ -164,7 +163,7 @@ double StepWall::speed_near(const Vec3& centre, double radius, double h) const {
 
 double StepWall::overlap(const Vec3& centre, double radius, const Placement& where) const {
   double deepest = 0;
-  for (const Touch& touch : touches(centre, radius, where))
+  for (const WallTouch& touch : touches(centre, radius, where))
     deepest = std::max(deepest, radius - touch.distance);
   return deepest;
 }

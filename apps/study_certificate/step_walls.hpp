@@ -4,7 +4,6 @@
 /// planes, and how prescribed motions move them (docs/theory.md, "Walls"). Of kernels/shapes it takes the
 /// numbers of a scene, and the triangles that a mesh was read with; distances and velocities are its own.
 
-#include <string_view>
 #include <vector>
 
 #include "kernels/shapes/walls.hpp"
@@ -12,7 +11,7 @@
 namespace talus::audit {
 
 /// Where a sphere touches a wall.
-struct Touch {
+struct WallTouch {
   double distance = 0;         ///< [m] of its centre; below 0 in a solid or behind a plane
   Vec3 normal = Vec3::Zero();  ///< unit, from the wall to the centre
 };
@@ -39,10 +38,10 @@ class StepWall {
   /// has, from where it is.
   Placement placed(double later) const;
   /// Every point nearer than `reach` [m] in which a sphere touches it there.
-  std::vector<Touch> touches(const Vec3& centre, double reach, const Placement& where) const;
+  std::vector<WallTouch> touches(const Vec3& centre, double reach, const Placement& where) const;
   /// Velocity of its material at a point [m/s] where it touches with this normal: by the rigid motion that
   /// carries it from the middle of a step of length `h` to that of the next, and that of its surface, along
-  /// it. Of a wall that a load moves without that of the wall itself: 0.
+  /// it. 0 for a wall that a load moves: its velocity is in Motion::walls.
   Vec3 material_velocity(const Vec3& point, const Vec3& normal, double h) const;
   /// The largest speed of its material near a sphere, or more [m/s].
   double speed_near(const Vec3& centre, double radius, double h) const;
@@ -54,8 +53,5 @@ class StepWall {
   double time_;
   std::vector<Triangle> triangles_;  ///< of a mesh, in its first place
 };
-
-/// Whether the audit knows the shape of that name.
-bool knows_shape(std::string_view name);
 
 }  // namespace talus::audit

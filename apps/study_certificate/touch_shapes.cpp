@@ -6,19 +6,18 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace talus::audit {
 
 namespace {
 
 /// Of a thin plate: from whichever side; `side` for a centre in the plate itself.
-Touch from_point(const Vec3& centre, const Vec3& nearest, const Vec3& side) {
+WallTouch from_point(const Vec3& centre, const Vec3& nearest, const Vec3& side) {
   const double distance = (centre - nearest).norm();
   return {distance, distance > 0 ? Vec3((centre - nearest) / distance) : side};
 }
 
-std::vector<Touch> touch_disc(const ShapeValues& values, const Vec3& centre) {
+std::vector<WallTouch> touch_disc(const ShapeValues& values, const Vec3& centre) {
   const Vec3 axis = values.vector("axis").normalized(), middle = values.vector("centre");
   const double height = axis.dot(centre - middle), radius = values.scalar("radius");
   const Vec3 foot = centre - height * axis;
@@ -26,7 +25,7 @@ std::vector<Touch> touch_disc(const ShapeValues& values, const Vec3& centre) {
   return {from_point(centre, out <= radius ? foot : Vec3(middle + radius / out * (foot - middle)), axis)};
 }
 
-std::vector<Touch> touch_rectangle(const ShapeValues& values, const Vec3& centre) {
+std::vector<WallTouch> touch_rectangle(const ShapeValues& values, const Vec3& centre) {
   const Vec3 corner = values.vector("corner"), a = values.vector("edge_a"), b = values.vector("edge_b");
   const double s = std::clamp(a.dot(centre - corner) / a.squaredNorm(), 0.0, 1.0),
                t = std::clamp(b.dot(centre - corner) / b.squaredNorm(), 0.0, 1.0);
@@ -57,13 +56,13 @@ Profile profile_of(const WallShape& shape) {
 }
 
 /// A shell: the nearest point and, where the sphere is inside, those a third of a turn away from it.
-std::vector<Touch> touch_shell(const Profile& profile, const Vec3& centre) {
+std::vector<WallTouch> touch_shell(const Profile& profile, const Vec3& centre) {
   const double up = profile.axis.dot(centre - profile.start);
   const Vec3 radial = centre - profile.start - up * profile.axis;
   const double out = radial.norm();
   const Vec3 direction = out > 0 ? Vec3(radial / out) : profile.axis.unitOrthogonal();
   const Vec3 nearest = profile.nearest(direction, out, up);
-  std::vector<Touch> all = {from_point(centre, nearest, -direction)};
+  std::vector<WallTouch> all = {from_point(centre, nearest, -direction)};
   const double radius_there = direction.dot(nearest - profile.start);
   if (out > radius_there) return all;
   for (const double turn : {2 * std::numbers::pi / 3, -2 * std::numbers::pi / 3}) {
@@ -74,7 +73,7 @@ std::vector<Touch> touch_shell(const Profile& profile, const Vec3& centre) {
 }
 
 /// A solid with closed ends.
-std::vector<Touch> touch_solid(const Profile& profile, const Vec3& centre) {
+std::vector<WallTouch> touch_solid(const Profile& profile, const Vec3& centre) {
   const double up = profile.axis.dot(centre - profile.start);
   const Vec3 radial = centre - profile.start - up * profile.axis;
   const double out = radial.norm();
@@ -86,15 +85,15 @@ std::vector<Touch> touch_solid(const Profile& profile, const Vec3& centre) {
   const Vec3 side = (profile.length * direction - lean * profile.axis) / slant;
   if (below < 0 && above < 0 && beside < 0) {
     if (beside >= below && beside >= above) return {{beside, side}};
-    return {below > above ? Touch{below, -profile.axis} : Touch{above, profile.axis}};
+    return {below > above ? WallTouch{below, -profile.axis} : WallTouch{above, profile.axis}};
   }
   const auto on_end = [&](double height, double radius) {
     return Vec3(profile.start + height * profile.axis + std::min(out, radius) * direction);
   };
-  Touch best{INFINITY, side};
+  WallTouch best{INFINITY, side};
   for (const Vec3& point : {profile.nearest(direction, out, up), on_end(0, profile.start_radius),
                             on_end(profile.length, profile.end_radius)})
-    if (const Touch touch = from_point(centre, point, side); touch.distance < best.distance) best = touch;
+    if (const WallTouch touch = from_point(centre, point, side); touch.distance < best.distance) best = touch;
   return {best};
 }
 
@@ -120,8 +119,8 @@ constexpr double one_place = 1e-6;
 
 /// The nearest point of each triangle, unless another triangle that has it, too, comes nearer to the centre;
 /// of points in one place the first. From behind nothing is touched.
-std::vector<Touch> touch_mesh(std::span<const Triangle> triangles, bool inside, const Vec3& centre,
-                              double reach) {
+std::vector<WallTouch> touch_mesh(std::span<const Triangle> triangles, bool inside, const Vec3& centre,
+                                  double reach) {
   struct Near {
     Triangle triangle;
     Vec3 normal, point;
@@ -136,7 +135,7 @@ std::vector<Touch> touch_mesh(std::span<const Triangle> triangles, bool inside, 
     if (distance < reach)
       near.push_back({triangle, normal, point, distance, normal.dot(centre - point) >= 0});
   }
-  std::vector<Touch> all;
+  std::vector<WallTouch> all;
   for (std::size_t k = 0; k < near.size(); ++k) {
     const Near& one = near[k];
     bool counts = true, in_front = one.in_front;
@@ -164,8 +163,8 @@ bool knows_shape(std::string_view name) {
   return std::ranges::find(known, name) != known.end();
 }
 
-std::vector<Touch> touches_of(const WallShape& shape, std::span<const Triangle> triangles, const Vec3& centre,
-                              double reach) {
+std::vector<WallTouch> touches_of(const WallShape& shape, std::span<const Triangle> triangles,
+                                  const Vec3& centre, double reach) {
   const bool inside = shape.values.truth("inside");
   if (shape.name == "disc") return touch_disc(shape.values, centre);
   if (shape.name == "rectangle") return touch_rectangle(shape.values, centre);

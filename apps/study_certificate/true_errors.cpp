@@ -22,14 +22,18 @@ struct Floors {
   double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
-  double corrected = 1e-9;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
+  double corrected = 1e-8;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
   double undone = 2;        ///< of what is undone of all overlaps: how far that may shift a grain
 };
 constexpr Floors floors;
 
-/// Velocities of pushed walls at the end of the step, as the run says.
-Vec3 wall_velocity(const StepProblem& problem, const Frame& after, std::size_t w) {
-  return after.walls[w].velocity * problem.wall_normal[w];
+/// The speed that a wall or a flow lends a contact [m/s].
+double drive_at(const StepProblem& problem, const StepContact& contact) {
+  if (problem.cell.repeats) return problem.drive_speed;
+  if (!contact.at_wall()) return 0;
+  const double of_wall =
+      problem.wall_inv_mass[contact.wall()] > 0 ? 0 : problem.free.walls[contact.wall()].norm();
+  return std::max(of_wall, contact.drift.norm());
 }
 
 /// On walls; with `pressed` what the law speaks of, r + pull n.
@@ -99,7 +103,9 @@ Momenta momenta(const StepProblem& problem, const Reference& reference, const St
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
     const bool moves = problem.wall_inv_mass[w] > 0;
     const double mass = moves ? 1 / problem.wall_inv_mass[w] : 0;
-    found.wrong.push_back(moves ? mass * (wall_velocity(problem, end.after, w) - exact.walls[w]).norm() : 0);
+    const double found_speed = end.after.walls[w].velocity,
+                 right_speed = problem.wall_normal[w].dot(exact.walls[w]);
+    found.wrong.push_back(moves ? mass * std::abs(found_speed - right_speed) : 0);
     found.exchanged.push_back(mass * (exact.walls[w] - free.walls[w]).norm());
   }
   found.wrong.push_back(mass_of_cell(problem) * (end.cell - exact.cell).norm());
@@ -129,7 +135,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
   std::size_t count = 0;
   const std::vector<std::size_t> cluster = clusters_of(problem, count);
   struct Sums {
-    double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0;
+    double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0, drive = 0;
   };
   std::vector<Sums> sums(count);
   std::vector<char> seen(momentum.wrong.size(), 0);
@@ -153,13 +159,13 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
       add(grains + contact.wall());
     if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
     if (contact.at_wall()) own.wall_impulse = std::max(own.wall_impulse, exact[c].norm());
+    if (exact[c] != Vec3::Zero()) own.drive = std::max(own.drive, drive_at(problem, contact));
   }
   double worst = 0;
   const double weight = problem.time_step * problem.gravity.norm();
   for (const Sums& own : sums) {
-    const double unit =
-        std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * problem.drive_speed,
-                  floors.load * own.mass * weight, floors.cluster * own.momentum, 1e-300});
+    const double unit = std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * own.drive,
+                                  floors.load * own.mass * weight, floors.cluster * own.momentum, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;

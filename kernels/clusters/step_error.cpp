@@ -90,6 +90,7 @@ class Answers {
     }
     answers_.resize(clusters_.size());
     scales_.resize(clusters_.size());
+    floors_.resize(clusters_.size());
     noise_.resize(clusters_.size());
   }
 
@@ -104,8 +105,8 @@ class Answers {
       // What rounding makes must pass whatever is asked.
       const double still =
           rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
-      scales_[c] =
-          std::max({scale_of(rows[c], thresholds_), thresholds_.elsewhere * everywhere * share, still});
+      floors_[c] = thresholds_.elsewhere * everywhere * share;
+      scales_[c] = std::max({scale_of(rows[c], thresholds_), floors_[c], still});
       noise_[c] = std::max(thresholds_.rounding * most_momentum(rows[c][mass], rows[c][incoming]), still);
       answers_[c] = solve_cluster(clusters_[c].problem,
                                   {goal.enough * scales_[c], goal.enough, goal.sweeps, goal.still},
@@ -118,8 +119,7 @@ class Answers {
     StepError error;
     error.velocity = largest([&](std::size_t c) { return velocity_error(c); });
     error.wall = wall_error(goal);
-    const double most = largest([&](std::size_t c) { return largest_impulse(c); });
-    const auto contact = [&](std::size_t c) { return contact_error(c, most); };
+    const auto contact = [&](std::size_t c) { return contact_error(c); };
     error.contact = largest(contact);
     const auto any = [&](bool ClusterAnswer::*which, bool value) {
       return largest([&](std::size_t c) {
@@ -172,13 +172,13 @@ class Answers {
   double largest_impulse(std::size_t c) const {
     return talus::largest_impulse(clusters_[c].problem, answers_[c].found);
   }
-  /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `elsewhere` times
-  /// that of all, or what rounding leaves. How fast walls or a flow are says nothing of forces.
-  double contact_error(std::size_t c, double most) const {
+  /// The largest change of a contact's impulse, over the largest impulse of its cluster, or what is done
+  /// elsewhere, or what rounding leaves. How fast walls or a flow are says nothing of forces.
+  double contact_error(std::size_t c) const {
     double change = 0;
     for (const Vec3& by : answers_[c].found) change = larger(change, by.norm());
     if (change == 0) return 0;
-    return change / std::max({largest_impulse(c), thresholds_.elsewhere * most, noise_[c]});
+    return change / std::max({largest_impulse(c), floors_[c], noise_[c]});
   }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least
   /// ErrorGoal::walls: the largest.
@@ -235,6 +235,7 @@ class Answers {
   std::vector<std::vector<std::size_t>> own_;  ///< per part: clusters that it answers for
   std::vector<ClusterAnswer> answers_;
   std::vector<double> scales_;  ///< [N s]
+  std::vector<double> floors_;  ///< what is done elsewhere makes of them [N s]
   std::vector<double> noise_;   ///< what rounding leaves of momenta [N s]
   Exchanged exchanged_;         ///< by all of them
 };

@@ -18,10 +18,9 @@ struct StepErrorThresholds {
   ClusterThresholds cluster;
   /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them.
   double interest = BalanceThresholds{}.interest;
-  /// Of what all clusters do, per mass, in (0, 1): one that does less is measured by this part of it; and its
-  /// contacts by this part of the largest impulse of all. What
-  /// happens elsewhere in a step must not hide that a column at rest falls: a ball that hits the floor beside
-  /// it at 5 m/s does 5000 times as much, per mass.
+  /// Of what all clusters do, per mass, in (0, 1): one that does less is measured by this part of it, and the
+  /// impulses of its contacts, too. What happens elsewhere in a step must not hide that a column at rest
+  /// falls: a ball that hits the floor beside it at 5 m/s does 5000 times as much, per mass.
   double elsewhere = 1e-6;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = BalanceThresholds{}.rounding;

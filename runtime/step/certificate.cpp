@@ -244,10 +244,11 @@ Certificate::LargeEnergy Certificate::exchanged_by_large() const {
   return {exchanged_.energy - exchanged_by_small_.energy + of_walls * mass / all, 0.5 * mass * speed * speed};
 }
 
-/// Small clusters hide what large ones do: where theirs is most of the energy, the rest is a difference of a
-/// sum of now and one of their last check; and nobody has told what part of the impulses at walls is theirs.
-bool Certificate::small_hide_large() const {
-  if (!(exchanged_by_small_.mass > 0)) return false;
+/// Small clusters hide what large ones do: where theirs is most of the energy, or unknown, the rest is a
+/// difference of a sum of now and one of their last check; and nobody has told what part of the impulses at
+/// walls is theirs.
+bool Certificate::small_hide_large(WholeProblem& whole) const {
+  if (!(exchanged_by_small_.mass > 0)) return small_known_ && whole.small_clusters();
   const LargeEnergy large = exchanged_by_large();
   return exchanged_by_small_.energy > thresholds_.hiding * exchanged_.energy || large.least > large.moved;
 }
@@ -255,7 +256,7 @@ bool Certificate::small_hide_large() const {
 /// What stands beside a large cluster must not hide its errors: each is weighed by itself, and the worst
 /// speaks.
 double Certificate::relative_work(WholeProblem& whole) {
-  if (!whole.several_large_clusters() && !small_hide_large())
+  if (!whole.several_large_clusters() && !small_hide_large(whole))
     return work_ > 0 ? work_ / exchanged_by_large().counts() : 0;
   if (work_at_ != result_.iterations) {
     work_at_ = result_.iterations;

@@ -234,7 +234,7 @@ class Certificate {
     double counts() const { return std::max(moved, least); }
   };
   LargeEnergy exchanged_by_large() const;
-  bool small_hide_large() const;
+  bool small_hide_large(WholeProblem& whole) const;
   double relative_work(WholeProblem& whole);
   double drift() const;
   double wall_scale() const;

@@ -70,7 +70,7 @@ class GlobalSolver {
   /// What these answers have taken since this was asked last [s].
   double take_small_seconds();
   double large_error(double enough) const;
-  /// Of several large clusters, and the same impulses: kernels/clusters/cluster_work.hpp.
+  /// Of large clusters, and the same impulses: kernels/clusters/cluster_work.hpp.
   double large_work(double speed, double interest) const;
   /// Of the same impulses: the residual that a share `part` of all contacts does not exceed, and what is
   /// furthest from its law (kernels/global/residuals.hpp).

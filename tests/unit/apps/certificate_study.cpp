@@ -118,37 +118,6 @@ TEST(CertificateScenes, OfEveryFamilyAreOfItsSizeAndRun) {
     }
 }
 
-// Positions are no part of a step's problem: a wall that turned once threw grains through it, and every step
-// was certified.
-TEST(CertificateAudit, AsksWhetherGrainsAreWhereTheirVelocitiesAndOverlapsTakeThem) {
-  constexpr double h = 1e-3, radius = 0.01, overlap = 1e-4, part = 0.1;
-  Frame before;
-  before.x = {{0, 0, 0.3}, {0.02 - overlap, 0, 0.3}};
-  before.u = {{0, 0.4, -1}, {0, 0.4, -1}};
-  before.radius = {radius, radius};
-  Frame after = before;
-  for (Vec3& x : after.x) x += h * before.u[0];
-  Stage stage;
-  stage.time_step = h;
-  const Bodies bodies;
-  const talus::Setup setup;
-  const StepInput input{before, {}, {}, stage, bodies, setup};
-  const auto shift = [&](double given) { return unexplained_shift(input, given, after); };
-  EXPECT_LT(shift(0), 1);
-  after.x[1][0] += part * overlap;
-  EXPECT_LT(shift(part), 1) << "that is what overlap_correction is for";
-  EXPECT_GT(shift(0), 1) << "nobody has asked for it";
-  after.x[1][0] += overlap;
-  EXPECT_GT(shift(part), 1) << "more than is undone in a step";
-  // Where nothing overlaps, the rest of a solve that has ended: a billionth of a radius.
-  before.x[1][0] += radius;
-  after.x[1] = before.x[1] + h * before.u[1];
-  after.x[1][0] += part * 9e-10 * radius;
-  EXPECT_LT(shift(part), 1);
-  after.x[1][0] += radius * 1e-6;
-  EXPECT_GT(shift(part), 1);
-}
-
 TEST(CertificateScenes, OfASizeHaveSoManyTimesTheGrains) {
   for (const char* family : {"column", "chain", "wedge", "rows"}) {
     const std::size_t usual = make_scene(family, 7, {}).grains.size();

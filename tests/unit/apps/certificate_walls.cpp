@@ -11,6 +11,7 @@
 #include <memory>
 #include <numbers>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "apps/shared/sample_builder.hpp"
@@ -94,13 +95,13 @@ TEST(CertificateWalls, AreTouchedWhereThoseOfTheProgramAre) {
     const StepWall own(wall, 0);
     for (int k = 0; k < 2000; ++k) {
       const Vec3 centre(anywhere(random), anywhere(random), anywhere(random));
-      std::vector<Touch> touches = own.touches(centre, 0.4, {});
+      std::vector<WallTouch> touches = own.touches(centre, 0.4, {});
       std::vector<SurfacePoint> points;
       collide(wall, centre, 0.4, points);
       ASSERT_EQ(touches.size(), points.size()) << wall.name << " at " << centre.transpose();
       several += touches.size() > 1 ? 1 : 0;
       for (const SurfacePoint& point : points) {
-        const auto same = std::ranges::find_if(touches, [&](const Touch& touch) {
+        const auto same = std::ranges::find_if(touches, [&](const WallTouch& touch) {
           return (touch.normal - point.normal).norm() < 1e-9 &&
                  std::abs(touch.distance - point.distance) < 1e-12;
         });
@@ -108,7 +109,7 @@ TEST(CertificateWalls, AreTouchedWhereThoseOfTheProgramAre) {
       }
     }
   }
-  EXPECT_GT(several, 1000);
+  EXPECT_GT(several, 100) << "places in which a wall is touched more than once";
 }
 
 TEST(CertificateWalls, MoveAsThoseOfTheProgramDo) {
@@ -189,6 +190,37 @@ TEST(CertificateWalls, AGrainHangsFromACeilingThatHoldsIt) {
   }
 }
 
+// Positions are no part of a step's problem: a wall that turned once threw grains through it, and every step
+// was certified.
+TEST(CertificateAudit, AsksWhetherGrainsAreWhereTheirVelocitiesAndOverlapsTakeThem) {
+  constexpr double radius = 0.01, overlap = 1e-4, part = 0.1;
+  Frame before;
+  before.x = {{0, 0, 0.3}, {0.02 - overlap, 0, 0.3}};
+  before.u = {{0, 0.4, -1}, {0, 0.4, -1}};
+  before.radius = {radius, radius};
+  Frame after = before;
+  for (Vec3& x : after.x) x += h * before.u[0];
+  Stage stage;
+  stage.time_step = h;
+  const Bodies bodies;
+  const talus::Setup setup;
+  const StepInput input{before, {}, {}, stage, bodies, setup};
+  const auto shift = [&](double given) { return unexplained_shift(input, given, after); };
+  EXPECT_LT(shift(0), 1);
+  after.x[1][0] += part * overlap;
+  EXPECT_LT(shift(part), 1) << "that is what overlap_correction is for";
+  EXPECT_GT(shift(0), 1) << "nobody has asked for it";
+  after.x[1][0] += overlap;
+  EXPECT_GT(shift(part), 1) << "more than is undone in a step";
+  // Where nothing overlaps, the rest of a solve that has ended: a hundred millionth of a radius.
+  before.x[1][0] += radius;
+  after.x[1] = before.x[1] + h * before.u[1];
+  after.x[1][0] += part * 9e-9 * radius;
+  EXPECT_LT(shift(part), 1);
+  after.x[1][0] += radius * 1e-6;
+  EXPECT_GT(shift(part), 1);
+}
+
 // With `overlap_correction` a grain before a paddle was once shifted by the paddle's velocity as if that were
 // a length, and every step was certified.
 TEST(CertificateWalls, AGrainBeforeAPaddleIsWhereItsVelocityTakesItAndNotBehindThePaddle) {
@@ -214,7 +246,7 @@ TEST(CertificateWalls, AGrainBeforeAPaddleIsWhereItsVelocityTakesItAndNotBehindT
 
 TEST(CertificateWalls, OfTheFamiliesMakeTheProblemsOfTheirRuns) {
   int judged = 0;
-  for (const char* family : {"drum", "hopper", "paddle", "mesh", "shaken", "sticky"})
+  for (const char* family : {"drum", "hopper", "paddle", "mesh", "shaken", "sticky", "apart"})
     for (std::uint64_t seed = 11; seed <= 16; ++seed) {
       MadeScene made = make_scene(family, seed, {.steps = 8});
       io::place_walls(made.scene, made.grains);
@@ -227,11 +259,34 @@ TEST(CertificateWalls, OfTheFamiliesMakeTheProblemsOfTheirRuns) {
         if (step.judged != Judged::yes || !step.certified || step.overlapping) continue;
         ++judged;
         const TrueErrors& errors = step.errors;
-        EXPECT_LT(std::max({errors.velocity, errors.wall_force, errors.contact_force}), 2 * step.claimed)
+        EXPECT_LT(std::max({errors.velocity, errors.wall_force, errors.contact_force, errors.cluster}),
+                  2 * step.claimed)
             << made.name() << " " << step.step;
       }
     }
   EXPECT_GT(judged, 200);
+}
+
+/// The scene's wall of that name is there in one of two stages.
+TEST(CertificateWalls, ThatComeAndGoAreThereInTheirStages) {
+  for (const bool comes : {false, true}) {
+    MadeScene made = make_scene("deposition", 4, {.steps = 4});
+    Stage second = made.scene.setup.stages.front();
+    made.scene.setup.stages = {second, second};
+    made.scene.setup.stages.back().name = "later";
+    for (Stage& stage : made.scene.setup.stages) stage.end.steps = 2;
+    Wall& floor = made.scene.setup.walls.front();
+    (comes ? floor.from_stage : floor.until_stage) = "later";
+    io::place_walls(made.scene, made.grains);
+    Bodies bodies;
+    append(made.grains, bodies);
+    const AuditedRun run = audit_run(made.scene, bodies, {4, {}});
+    ASSERT_EQ(run.steps.size(), 4U) << run.ended;
+    for (const AuditedStep& step : run.steps)
+      EXPECT_NE(step.judged, Judged::other_problem) << step.step << ": " << step.why;
+    const std::int64_t with = run.steps[comes ? 2 : 0].contacts, without = run.steps[comes ? 0 : 2].contacts;
+    EXPECT_GT(with, without);
+  }
 }
 
 }  // namespace

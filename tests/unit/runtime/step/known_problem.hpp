@@ -49,7 +49,8 @@ class KnownProblem : public WholeProblem {
   std::size_t asked() const { return asked_; }
   std::size_t small_asked() const { return small_asked_; }
   bool jammed = false, mends = false;  ///< what small clusters are besides
-  Exchanged exchanged;                 ///< by them
+  /// By them: next to nothing; of no mass it is not known.
+  Exchanged exchanged = {.energy = 0, .mass = 1e-12};
   std::optional<double> largest_work;  ///< of large clusters, where one is to be weighed by itself
   bool several = true;                 ///< of them
   ExchangeFloors floors;               ///< that it was last asked for with
