@@ -99,7 +99,7 @@ TEST(Certificate, BelievesTheWorstOfSeveralLargeClusters) {
 TEST(Certificate, AsksALargeClusterItselfWhereSmallOnesDoMostOfWhatIsDone) {
   const auto asked_where_small_ones_do = [](double part, double wall = 1) {
     Certificate certificate(SolverSettings{.balance_tolerance = 0.05});
-    certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
+    certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}, .wall_inv_masses = {0}});
     KnownProblem problem(1, {0.5}, {0});
     problem.largest_work = 0.02;
     problem.several = false;
