@@ -61,6 +61,10 @@ double SceneBench::weight() const {
   return density * 4 / 3 * std::numbers::pi * radius * radius * radius * (gravity > 0 ? gravity : earth);
 }
 
+double SceneBench::speed_of_fall() const {
+  return std::sqrt((gravity > 0 ? gravity : earth) * radius);
+}
+
 double SceneBench::draw_radius() {
   return radius * (spread_ + (1 - spread_) * draws.unit());
 }
@@ -103,14 +107,13 @@ double SceneBench::top() const {
 void SceneBench::add_lid(double load) {
   Wall& lid = add_wall("z+", {0, 0, top()}, -Vec3::UnitZ());
   const double kind = draws.unit();
-  const double speed_of_fall = std::sqrt((gravity > 0 ? gravity : earth) * radius);
   if (kind < 0.5)
     lid.load = {.drive = WallDrive::force,
                 .force = load,
                 .mass = weight() / (gravity > 0 ? gravity : earth) * draws.between_decades(1e-2, 1e4)};
   else if (kind < 0.8)
     lid.load = {.drive = WallDrive::velocity,
-                .velocity = Vec3(0, 0, -speed_of_fall * draws.between_decades(1e-4, 1))};
+                .velocity = Vec3(0, 0, -speed_of_fall() * draws.between_decades(1e-4, 1))};
 }
 
 void SceneBench::drop(double x, double y, double r, double floor) {

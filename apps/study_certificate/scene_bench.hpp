@@ -29,8 +29,9 @@ class SceneBench {
   std::vector<Stage> cell_stages = {};
 
   int draw_count(int low, int high) { return size * draws.from_to(low, high); }  ///< of grains
-  double weight() const;  ///< [N] of a usual grain; of one under 9.81 m/s^2 without gravity
-  double draw_radius();   ///< [m] of a grain of the scene's distribution
+  double weight() const;         ///< [N] of a usual grain; of one under 9.81 m/s^2 without gravity
+  double speed_of_fall() const;  ///< [m/s] by a usual radius, as `weight`
+  double draw_radius();          ///< [m] of a grain of the scene's distribution
   void add(const Vec3& x, double r);
   void add_moving(const Vec3& x, double r, const Vec3& u);
   std::size_t count() const { return made.grains.x.size(); }

@@ -181,8 +181,7 @@ void make_apart(SceneBench& bench) {
   else
     make_rows(bench);
   const double r = bench.radius * draws.between_decades(0.5, 30);
-  const double fall = std::sqrt((bench.gravity > 0 ? bench.gravity : 9.81) * bench.radius);
-  const Vec3 u(fall * draws.between_decades(0.1, 1e3), 0, 0);
+  const Vec3 u(bench.speed_of_fall() * draws.between_decades(0.1, 1e3), 0, 0);
   std::vector<Wall>& walls = bench.made.scene.setup.walls;
   std::erase_if(walls, [](const Wall& wall) { return wall.name == "z+"; });  // a lid would be in their way
   const Vec3 above(0, 0, bench.top() + 3 * r);

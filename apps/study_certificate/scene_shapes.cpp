@@ -23,10 +23,6 @@ constexpr int most_passes = 300;
 /// Of the radius: so near to a wall is on it, and an overlap by less is none.
 constexpr double on_wall = 1e-12, overlap_allowed = 1e-9;
 
-double speed_of_fall(const SceneBench& bench) {
-  return std::sqrt((bench.gravity > 0 ? bench.gravity : 9.81) * bench.radius);
-}
-
 /// Distance of a sphere's surface from the nearest wall, at most its radius [m].
 double clearance(const std::vector<StepWall>& walls, const Vec3& x, double r) {
   double least = r;
@@ -47,7 +43,7 @@ bool in_solid(const SceneBench& bench, const Vec3& x) {
 /// find no room are left out.
 void pour(SceneBench& bench, int grains, const Vec3& low, const Vec3& high) {
   std::vector<StepWall> walls;
-  for (const Wall& wall : bench.made.scene.setup.walls) walls.emplace_back(wall, 0);
+  for (const Wall& wall : bench.made.scene.setup.walls) walls.emplace_back(wall, 0, 0);
   Draws& draws = bench.draws;
   for (int tries = 0; static_cast<int>(bench.count()) < grains && tries < 50 * grains; ++tries) {
     const double r = bench.draw_radius();
@@ -86,44 +82,28 @@ std::vector<double> numbers_of(const Vec3& v) {
   return {v[0], v[1], v[2]};
 }
 
-MotionPart turning(const Vec3& axis, const Vec3& point, double rate) {
-  MotionPart part;
-  part.kind = MotionPart::Kind::rotation;
-  part.axis = axis.normalized();
-  part.point = point;
-  part.rate = rate;
-  return part;
-}
+/// What walls may turn about.
+struct Axle {
+  Vec3 axis, point;  ///< of any length; [m]
+  double arm;        ///< [m] where the speed is that of the scene
+};
 
-MotionPart going(const Vec3& velocity) {
-  MotionPart part;
-  part.velocity = velocity;
-  return part;
-}
-
-/// Along a direction, with a largest speed of `speed` [m/s] and some periods within the steps.
-MotionPart swinging(SceneBench& bench, const Vec3& direction, double speed) {
-  MotionPart part;
-  part.kind = MotionPart::Kind::oscillation;
-  part.direction = direction.normalized();
-  part.amplitude = bench.radius * bench.draws.between_decades(1e-3, 0.3);
-  part.frequency = speed / (2 * std::numbers::pi * part.amplitude);
-  part.phase = bench.draws.between(0, 2 * std::numbers::pi);
-  return part;
-}
-
-/// Gives walls one motion, or none in a quarter of the scenes: turns about the axis, at up to `speed` [m/s]
-/// at the distance `arm`, swings, or both.
-void move(SceneBench& bench, std::vector<std::string> names, const MotionPart& turn, double arm) {
+/// Gives walls one motion, or none in a quarter of the scenes: they turn about the axle, swing by up to a
+/// third of a radius, or both.
+void move(SceneBench& bench, const std::vector<std::string>& names, const Axle& axle) {
   Draws& draws = bench.draws;
-  const double speed = speed_of_fall(bench) * draws.between_decades(1e-3, 3), kind = draws.unit();
+  const double speed = bench.speed_of_fall() * draws.between_decades(1e-3, 3), kind = draws.unit();
   if (kind < 0.25) return;
   std::vector<MotionPart> motion;
-  if (kind < 0.8) {
-    motion.push_back(turn);
-    motion.back().rate = (draws.chance(0.5) ? 1 : -1) * speed / arm;
+  if (kind < 0.8)
+    motion.push_back(rotation_part(axle.axis, axle.point, (draws.chance(0.5) ? 1 : -1) * speed / axle.arm));
+  if (kind > 0.65) {
+    const Vec3 direction = draws.direction();
+    const double amplitude = bench.radius * draws.between_decades(1e-3, 0.3),
+                 frequency = speed / (2 * std::numbers::pi * amplitude);
+    motion.push_back(
+        oscillation_part(direction, amplitude, frequency, draws.between(0, 2 * std::numbers::pi)));
   }
-  if (kind > 0.65) motion.push_back(swinging(bench, draws.direction(), speed));
   bench.wall_speed = std::max(bench.wall_speed, speed);
   for (Wall& wall : bench.made.scene.setup.walls)
     if (std::ranges::find(names, wall.name) != names.end()) wall.motion = motion;
@@ -184,7 +164,7 @@ void make_drum(SceneBench& bench) {
   }
   pour(bench, bench.draw_count(3, 110), {-wide, 0, -wide}, {wide, length, 0.9 * wide});
   move(bench, {"shell", rings ? "y+" : "", draws.chance(0.5) ? "y-" : ""},
-       turning(Vec3::UnitY(), Vec3::Zero(), 0), wide);
+       {Vec3::UnitY(), Vec3::Zero(), wide});
 }
 
 void make_hopper(SceneBench& bench) {
@@ -206,7 +186,7 @@ void make_hopper(SceneBench& bench) {
   if (outlet > 0 && draws.chance(0.6)) bench.add_wall("plug", Vec3::Zero(), Vec3::UnitZ());
   pour(bench, bench.draw_count(2, 110), {-wide, -wide, 0}, {wide, wide, 2.9 * high + 17 * bench.radius});
   move(bench, {"cone", draws.chance(0.5) ? "tube" : "", draws.chance(0.5) ? "plug" : ""},
-       turning(Vec3::UnitZ(), Vec3::Zero(), 0), wide);
+       {Vec3::UnitZ(), Vec3::Zero(), wide});
 }
 
 void make_paddle(SceneBench& bench) {
@@ -241,7 +221,7 @@ void make_paddle(SceneBench& bench) {
                                   {"end_radius", {draws.chance(0.5) ? 0 : side / 2}}}));
   }
   pour(bench, bench.draw_count(2, 110), {0, 0, 0}, {base, base, 4 * base});
-  move(bench, {"paddle"}, turning(axis, middle, 0), side);
+  move(bench, {"paddle"}, {axis, middle, side});
 }
 
 void make_mesh_drum(SceneBench& bench) {
@@ -259,7 +239,7 @@ void make_mesh_drum(SceneBench& bench) {
     axis = Vec3(0.1, 1, 0.2);
   }
   pour(bench, bench.draw_count(2, 110), {-wide, 0, -wide}, {wide, length, 0.9 * wide});
-  move(bench, {draws.chance(0.7) ? "shell" : "block"}, turning(axis, {0, length / 2, 0}, 0), wide);
+  move(bench, {draws.chance(0.7) ? "shell" : "block"}, {axis, {0, length / 2, 0}, wide});
 }
 
 void make_shaken(SceneBench& bench) {
@@ -270,12 +250,14 @@ void make_shaken(SceneBench& bench) {
   std::vector<std::string> names;
   for (const char* name : {"z-", "x-", "x+", "y-", "y+"})
     if (draws.chance(0.7)) names.emplace_back(name);
-  move(bench, names, turning(draws.direction(), {base / 2, base / 2, 0}, 0), base);
+  move(bench, names, {draws.direction(), {base / 2, base / 2, 0}, base});
   Wall& floor = bench.made.scene.setup.walls.front();
   if (!floor.motion.empty() && draws.chance(0.5)) return;
-  MotionPart belt = draws.chance(0.5)
-                        ? going(Vec3(draws.unit(), draws.unit(), 0) * speed_of_fall(bench))
-                        : turning(Vec3::UnitZ(), {base / 2, base / 2, 0}, speed_of_fall(bench) / base);
+  MotionPart belt;
+  if (draws.chance(0.5))
+    belt.velocity = Vec3(draws.unit(), draws.unit(), 0) * bench.speed_of_fall();
+  else
+    belt = rotation_part(Vec3::UnitZ(), {base / 2, base / 2, 0}, bench.speed_of_fall() / base);
   belt.surface_only = true;
   floor.motion.push_back(belt);
 }

@@ -195,7 +195,7 @@ class Builder {
 
   void meet_walls() {
     for (std::size_t w = 0; w < in_.walls.size(); ++w) {
-      const StepWall wall(in_.walls[w], in_.before.time);
+      const StepWall wall(in_.walls[w], in_.before.time, numbers_.h);
       if (!wall.there()) continue;
       const Placement middle = wall.placed(numbers_.h / 2);
       for (std::size_t i = 0; i < n_; ++i) meet_wall(wall, w, middle, i);
@@ -210,11 +210,11 @@ class Builder {
     const Vec3 gained =
         numbers_.h * (in_.stage.gravity - in_.loads[w] * in_.walls[w].inv_mass() * in_.walls[w].normal);
     const Vec3 apart = in_.before.u[i] - (wall.moves() ? Vec3(Vec3::Zero()) : in_.walls[w].velocity);
-    const double speed = apart.norm() + gained.norm() + wall.speed_near(middle_[i], radius, numbers_.h);
+    const double speed = apart.norm() + gained.norm() + wall.speed_near(middle_[i], radius);
     for (const WallTouch& touch :
          wall.touches(middle_[i], radius + numbers_.alert + numbers_.h * speed, middle)) {
       const Vec3 point = middle_[i] - radius * touch.normal;
-      Vec3 drift = wall.material_velocity(point, touch.normal, numbers_.h);
+      Vec3 drift = wall.material_velocity(point, touch.normal);
       const double gap = touch.distance - radius, v_n = touch.normal.dot(apart - drift);
       double bias = 0;
       if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained)}, pair.restitution, held.reach, bias))
@@ -293,9 +293,8 @@ Vec3 relative_velocity(const StepContact& contact, const Motion& motion) {
 
 double speed_of_bodies(const StepProblem& problem, const StepContact& contact) {
   const Motion& free = problem.free;
-  const double other =
-      contact.at_wall() ? free.walls[contact.wall()].norm() + (problem.walls_move ? contact.drift.norm() : 0)
-                        : free.u[contact.other()].norm();
+  const double other = contact.at_wall() ? free.walls[contact.wall()].norm() + contact.drift.norm()
+                                         : free.u[contact.other()].norm();
   return free.u[contact.first].norm() + other;
 }
 

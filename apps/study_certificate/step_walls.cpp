@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
-#include <string>
 
 #include "apps/study_certificate/touch_shapes.hpp"
 
@@ -84,11 +82,6 @@ Mat3 cross_matrix(const Vec3& v) {
   return cross;
 }
 
-/// A rigid velocity: origin + omega x c at a point c.
-struct Twist {
-  Vec3 origin, omega;
-};
-
 /// The one that carries a body from one place to another within h: the logarithm of the way between them.
 Twist twist_between(const Placement& from, const Placement& to, double h) {
   const Mat3 turn = to.turn * from.turn.transpose();
@@ -107,10 +100,20 @@ Twist twist_between(const Placement& from, const Placement& to, double h) {
 
 }  // namespace
 
-StepWall::StepWall(const Wall& wall, double time) : wall_(wall), time_(time) {
-  if (!knows_shape(wall.shape.name))
-    throw std::invalid_argument("the audit knows no wall like '" + wall.name + "', a " + wall.shape.name);
+StepWall::StepWall(const Wall& wall, double time, double h) : wall_(wall), time_(time) {
   if (wall.shape.name == "mesh") wall.surface()->show(triangles_);
+  if (!moves()) return;
+  const Placement middle = placed(h / 2);
+  rigid_ = twist_between(middle, placed(3 * h / 2), h);
+  for (const MotionPart& part : wall.motion) {
+    if (!part.surface_only) continue;
+    const Done then = done_by(part, time + h / 2), done = done_by(part, time + 3 * h / 2);
+    along_.origin += middle.turn * (done.shift - then.shift) / h;
+    if (!part.turns()) continue;
+    const Vec3 omega = (done.angle - then.angle) / h * (middle.turn * part.axis);
+    along_.origin -= omega.cross(middle.of(part.point));
+    along_.omega += omega;
+  }
 }
 
 Placement StepWall::placed(double later) const {
@@ -133,32 +136,14 @@ std::vector<WallTouch> StepWall::touches(const Vec3& centre, double reach, const
   return all;
 }
 
-Vec3 StepWall::material_velocity(const Vec3& point, const Vec3& normal, double h) const {
-  if (!moves()) return Vec3::Zero();
-  const Placement middle = placed(h / 2), next = placed(3 * h / 2);
-  const Twist twist = twist_between(middle, next, h);
-  const Vec3 rigid = twist.origin + twist.omega.cross(point);
-  Vec3 along = Vec3::Zero();
-  for (const MotionPart& part : wall_.motion) {
-    if (!part.surface_only) continue;
-    const Done then = done_by(part, time_ + h / 2), done = done_by(part, time_ + 3 * h / 2);
-    along += middle.turn * (done.shift - then.shift) / h;
-    if (part.turns()) {
-      const Vec3 omega = (done.angle - then.angle) / h * (middle.turn * part.axis);
-      along += omega.cross(point - middle.of(part.point));
-    }
-  }
-  return rigid + along - along.dot(normal) * normal;
+Vec3 StepWall::material_velocity(const Vec3& point, const Vec3& normal) const {
+  const Vec3 along = along_.at(point);
+  return rigid_.at(point) + along - along.dot(normal) * normal;
 }
 
-double StepWall::speed_near(const Vec3& centre, double radius, double h) const {
-  const Vec3 at_centre = material_velocity(centre, Vec3::Zero(), h);
-  double speed = at_centre.norm();
-  for (const Eigen::Index axis : {0, 1, 2}) {
-    const Vec3 beside = material_velocity(centre + radius * Vec3::Unit(axis), Vec3::Zero(), h);
-    speed += (beside - at_centre).norm();
-  }
-  return speed;
+double StepWall::speed_near(const Vec3& centre, double radius) const {
+  return rigid_.at(centre).norm() + along_.at(centre).norm() +
+         radius * (rigid_.omega.norm() + along_.omega.norm());
 }
 
 double StepWall::overlap(const Vec3& centre, double radius, const Placement& where) const {

@@ -24,11 +24,17 @@ struct Placement {
   Vec3 back(const Vec3& x) const { return turn.transpose() * (x - shift); }
 };
 
-/// A wall as it is before a step that begins at `time` of the run [s].
+/// A rigid velocity: that of a point c is origin + omega x c.
+struct Twist {
+  Vec3 origin = Vec3::Zero(), omega = Vec3::Zero();  ///< [m/s], [rad/s]
+  Vec3 at(const Vec3& c) const { return origin + omega.cross(c); }
+};
+
+/// A wall of a shape that the audit knows (touch_shapes.hpp), as it is before a step.
 class StepWall {
  public:
-  /// Throws std::invalid_argument, naming the wall, where its shape is none that the audit knows.
-  StepWall(const Wall& wall, double time);
+  /// The step begins at `time` of the run and takes `h` [s]; 0 where nothing moves by itself.
+  StepWall(const Wall& wall, double time, double h);
 
   /// The wall is in this stage.
   bool there() const { return !wall_.absent; }
@@ -40,17 +46,18 @@ class StepWall {
   /// Every point nearer than `reach` [m] in which a sphere touches it there.
   std::vector<WallTouch> touches(const Vec3& centre, double reach, const Placement& where) const;
   /// Velocity of its material at a point [m/s] where it touches with this normal: by the rigid motion that
-  /// carries it from the middle of a step of length `h` to that of the next, and that of its surface, along
-  /// it. 0 for a wall that a load moves: its velocity is in Motion::walls.
-  Vec3 material_velocity(const Vec3& point, const Vec3& normal, double h) const;
-  /// The largest speed of its material near a sphere, or more [m/s].
-  double speed_near(const Vec3& centre, double radius, double h) const;
+  /// carries it from the middle of the step to that of the next, and that of its surface, along it. 0 for a
+  /// wall that a load moves: its velocity is in Motion::walls.
+  Vec3 material_velocity(const Vec3& point, const Vec3& normal) const;
+  /// The largest speed of its material in a sphere, or more [m/s].
+  double speed_near(const Vec3& centre, double radius) const;
   /// How deep a sphere is in it there [m]; 0 where it is outside.
   double overlap(const Vec3& centre, double radius, const Placement& where) const;
 
  private:
   Wall wall_;
   double time_;
+  Twist rigid_, along_;              ///< of the wall, and of its surface against it
   std::vector<Triangle> triangles_;  ///< of a mesh, in its first place
 };
 

@@ -271,7 +271,7 @@ double unexplained_shift(const StepInput& input, double part, const Frame& after
       overlaps += std::max(0.0, after.radius[i] + after.radius[j] - least);
     }
   for (std::size_t w = 0; w < input.walls.size() && part > 0; ++w) {
-    const StepWall wall(input.walls[w], before.time);
+    const StepWall wall(input.walls[w], before.time, h);
     if (!wall.there()) continue;
     Placement half = wall.placed(h / 2), end = wall.placed(h);
     if (!wall.moves()) {  // a load may have changed its speed

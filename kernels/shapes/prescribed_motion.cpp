@@ -85,6 +85,25 @@ struct Turning {
 
 }  // namespace
 
+MotionPart rotation_part(const Vec3& axis, const Vec3& point, double rate) {
+  MotionPart part;
+  part.kind = MotionPart::Kind::rotation;
+  part.axis = axis.normalized();
+  part.point = point;
+  part.rate = rate;
+  return part;
+}
+
+MotionPart oscillation_part(const Vec3& direction, double amplitude, double frequency, double phase) {
+  MotionPart part;
+  part.kind = MotionPart::Kind::oscillation;
+  part.direction = direction.normalized();
+  part.amplitude = amplitude;
+  part.frequency = frequency;
+  part.phase = phase;
+  return part;
+}
+
 void integrate(MotionTable& table) {
   table.shift.assign(table.t.size(), Vec3::Zero());
   for (std::size_t k = 1; k < table.t.size(); ++k)

@@ -68,6 +68,11 @@ struct MotionPart {
   bool turns() const { return kind == Kind::rotation || (table && !table->angle.empty()); }
 };
 
+/// About an axis of any length through a point [m], at `rate` [rad/s].
+MotionPart rotation_part(const Vec3& axis, const Vec3& point, double rate);
+/// Along a direction of any length, by `amplitude` [m], with `frequency` [1/s] and `phase` [rad].
+MotionPart oscillation_part(const Vec3& direction, double amplitude, double frequency, double phase = 0);
+
 /// What a motion has done since it began.
 struct Displacement {
   Vec3 shift = Vec3::Zero();  ///< [m]

@@ -22,7 +22,6 @@
 #include "kernels/law/attraction.hpp"
 #include "kernels/samples/sample.hpp"
 #include "tests/unit/mesh_makers.hpp"
-#include "tests/unit/motion_makers.hpp"
 
 namespace talus::audit::walls_test {
 namespace {
@@ -70,10 +69,10 @@ std::vector<Wall> walls_of_all_shapes() {
 std::vector<MotionPart> many_motions() {
   std::vector<MotionPart> parts(6);
   parts[0].velocity = {0.3, -0.2, 0.1};
-  parts[1] = test::rotation({1, 2, -1}, {0.1, 0, -0.2}, 3);
-  parts[2] = test::rotation(Vec3::UnitZ(), {0, 0.4, 0}, -2);
+  parts[1] = rotation_part({1, 2, -1}, {0.1, 0, -0.2}, 3);
+  parts[2] = rotation_part(Vec3::UnitZ(), {0, 0.4, 0}, -2);
   parts[2].begin = 0.5, parts[2].end = 1.2;
-  parts[3] = test::oscillation({0, 1, 1}, 0.05, 3, 0.7);
+  parts[3] = oscillation_part({0, 1, 1}, 0.05, 3, 0.7);
   parts[4].kind = MotionPart::Kind::table;
   parts[4].axis = Vec3::UnitX();
   MotionTable table;
@@ -82,7 +81,7 @@ std::vector<MotionPart> many_motions() {
   table.angle = {0, 0.3, 0.2, 0.9};
   integrate(table);
   parts[4].table = std::make_shared<const MotionTable>(table);
-  parts[5] = test::rotation(Vec3::UnitY(), Vec3::Zero(), 1.5);
+  parts[5] = rotation_part(Vec3::UnitY(), Vec3::Zero(), 1.5);
   parts[5].surface_only = true;
   return parts;
 }
@@ -92,7 +91,7 @@ TEST(CertificateWalls, AreTouchedWhereThoseOfTheProgramAre) {
   std::uniform_real_distribution<double> anywhere(-1.2, 1.2);
   int several = 0;
   for (const Wall& wall : walls_of_all_shapes()) {
-    const StepWall own(wall, 0);
+    const StepWall own(wall, 0, 0);
     for (int k = 0; k < 2000; ++k) {
       const Vec3 centre(anywhere(random), anywhere(random), anywhere(random));
       std::vector<WallTouch> touches = own.touches(centre, 0.4, {});
@@ -117,7 +116,7 @@ TEST(CertificateWalls, MoveAsThoseOfTheProgramDo) {
   for (const double time : {0.0, 0.3, 0.4995, 0.7, 1.199, 1.9, 2.4}) {
     Wall wall = walls_of_all_shapes().front();
     wall.motion = many_motions();
-    const StepWall own(wall, time);
+    const StepWall own(wall, time, h);
     const Pose pose = pose_at(wall.motion, time + h / 2);
     const Placement middle = own.placed(h / 2);
     EXPECT_LT((pose.turn - middle.turn).norm() + (pose.shift - middle.shift).norm(), 1e-12) << time;
@@ -125,8 +124,8 @@ TEST(CertificateWalls, MoveAsThoseOfTheProgramDo) {
     const RigidVelocity belt = mean_surface_velocity(wall.motion, time + h / 2, h, rigid.pivot);
     const Vec3 n = Vec3(1, 1, -1).normalized(), c(0.3, -0.6, 0.2), along = belt.at(c);
     const Vec3 expected = rigid.at(c) + along - along.dot(n) * n;
-    EXPECT_LT((own.material_velocity(c, n, h) - expected).norm(), 1e-10) << time;
-    EXPECT_GE(own.speed_near(c, 0.1, h), own.material_velocity(c + 0.1 * n, n, h).norm());
+    EXPECT_LT((own.material_velocity(c, n) - expected).norm(), 1e-10) << time;
+    EXPECT_GE(own.speed_near(c, 0.1), own.material_velocity(c + 0.1 * n, n).norm());
   }
 }
 
@@ -227,7 +226,7 @@ TEST(CertificateWalls, AGrainBeforeAPaddleIsWhereItsVelocityTakesItAndNotBehindT
   Wall paddle =
       wall_of("rectangle", {{"corner", {-0.1, 0, -0.1}}, {"edge_a", {0.2, 0, 0}}, {"edge_b", {0, 0, 0.2}}});
   constexpr double rate = 5;
-  paddle.motion = {test::rotation(Vec3::UnitZ(), {-0.1, 0, 0}, rate)};
+  paddle.motion = {rotation_part(Vec3::UnitZ(), {-0.1, 0, 0}, rate)};
   GrainAtWall step({0, R, 0}, paddle, Vec3::Zero());
   const StepProblem problem = rebuild_step(step.input());
   ASSERT_EQ(problem.contacts.size(), 1U);
@@ -267,7 +266,6 @@ TEST(CertificateWalls, OfTheFamiliesMakeTheProblemsOfTheirRuns) {
   EXPECT_GT(judged, 200);
 }
 
-/// The scene's wall of that name is there in one of two stages.
 TEST(CertificateWalls, ThatComeAndGoAreThereInTheirStages) {
   for (const bool comes : {false, true}) {
     MadeScene made = make_scene("deposition", 4, {.steps = 4});

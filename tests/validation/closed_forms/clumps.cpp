@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 
-#include "tests/unit/motion_makers.hpp"
 #include "tests/validation/clump_scenes.hpp"
 
 namespace talus::validation::closed_form_clumps_test {
@@ -314,7 +313,7 @@ TEST(Clumps, InADrumTheTorqueThatTurnsItDoesItsWork) {
   scene.friction(0.4);
   scene.surface("cylinder", {{"start", {0, -2, 0}}, {"end", {0, 2, 0}}, {"radius", {0.7}}, {"inside", {1}}});
   constexpr double rate = 3;
-  scene.setup.walls[0].motion = {test::rotation(Vec3::UnitY(), Vec3::Zero(), rate)};
+  scene.setup.walls[0].motion = {rotation_part(Vec3::UnitY(), Vec3::Zero(), rate)};
   scene.dumbbell({0, 0, -0.4}, about(Vec3::UnitY(), 0.3), {0.5, 0, 0});
   scene.dumbbell({0.2, 0.1, 0.1}, about({1, 1, 0}, 1));
   Experiment run(scene);

@@ -4,14 +4,10 @@
 
 #include <algorithm>
 
-#include "tests/unit/motion_makers.hpp"
 #include "tests/validation/experiment.hpp"
 
 namespace talus::validation::closed_form_motions_test {
 namespace {
-
-using test::oscillation;
-using test::rotation;
 
 constexpr double h = 1e-3, radius = 0.01;  // [s], [m]
 
@@ -19,9 +15,9 @@ constexpr double h = 1e-3, radius = 0.01;  // [s], [m]
 Experiment on_plate(double acceleration, double frequency, double step) {
   const double pulsation = 2 * pi * frequency;
   Scene scene(step);
-  MotionPart& shaking =
-      scene.wall("plate", Vec3::Zero(), Vec3::UnitZ())
-          .motion.emplace_back(oscillation(Vec3::UnitZ(), acceleration / (pulsation * pulsation), frequency));
+  MotionPart& shaking = scene.wall("plate", Vec3::Zero(), Vec3::UnitZ())
+                            .motion.emplace_back(oscillation_part(
+                                Vec3::UnitZ(), acceleration / (pulsation * pulsation), frequency));
   shaking.phase = -pi / 2;
   scene.stage().gravity = {0, 0, -g_earth};
   scene.sphere({0, 0, radius}, radius, 0.7);
@@ -69,7 +65,7 @@ Scene drum(double mu, bool rotates) {
   scene.surface(
       "cylinder",
       {{"start", {0, -0.03, 0}}, {"end", {0, 0.03, 0}}, {"radius", {drum_radius}}, {"inside", {1}}});
-  scene.setup.walls.back().motion = {rotation(Vec3::UnitY(), Vec3::Zero(), turns)};
+  scene.setup.walls.back().motion = {rotation_part(Vec3::UnitY(), Vec3::Zero(), turns)};
   scene.stage().gravity = {0, 0, -g_earth};
   scene.friction(mu);
   scene.setup.rotation = rotates;
@@ -221,7 +217,7 @@ Scene tumbler(bool mesh, double restitution, double mu) {
       }
   }
   for (Wall& wall : scene.setup.walls)
-    wall.motion = {rotation({1, 1, 1}, {0.1, 0, 0}, 1.3), oscillation({1, 0, 0}, 0.05, 0.7)};
+    wall.motion = {rotation_part({1, 1, 1}, {0.1, 0, 0}, 1.3), oscillation_part({1, 0, 0}, 0.05, 0.7)};
   scene.stage().laws.set_all(&PairLaw::restitution, restitution);
   scene.friction(mu);
   scene.sphere({0.1, 0.2, 0.3}, 0.2, 0.7, {0.5, -0.8, 0.3});
@@ -304,7 +300,8 @@ TEST(Tumbler, FollowsItsForcesAndTorques) {
 TEST(TiltedPlane, LetsABallGoAtTheAngleOfFriction) {
   const double mu = 0.3, rate = 0.5, reach = 0.2;
   Scene scene(h);
-  scene.wall("table", Vec3::Zero(), Vec3::UnitZ()).motion = {rotation(Vec3::UnitY(), Vec3::Zero(), rate)};
+  scene.wall("table", Vec3::Zero(), Vec3::UnitZ()).motion = {
+      rotation_part(Vec3::UnitY(), Vec3::Zero(), rate)};
   scene.stage().gravity = {0, 0, -g_earth};
   scene.friction(mu);
   scene.setup.rotation = false;
@@ -390,7 +387,7 @@ TEST(Motion, ThatLeapsPastABallAsTheTimeStepChangesIsSaid) {
 
 TEST(Motion, ChoosesTimeStepsThatFollowIt) {
   Scene scene(h);
-  scene.wall("plate", Vec3::Zero(), Vec3::UnitZ()).motion = {oscillation(Vec3::UnitZ(), 1e-3, 40)};
+  scene.wall("plate", Vec3::Zero(), Vec3::UnitZ()).motion = {oscillation_part(Vec3::UnitZ(), 1e-3, 40)};
   scene.stage().chooses_time_step = true;
   scene.stage().time_step = 0;
   scene.stage().time_step_max = 0.01;

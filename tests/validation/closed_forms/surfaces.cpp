@@ -125,7 +125,7 @@ TEST(BallPushedByAPaddle, IsShiftedByOverlapsOnlyWhileTheyAreUndone) {
     if (paddle == "rectangle")
       scene.surface(paddle, {{"corner", {-1, -1, 0}}, {"edge_a", {2, 0, 0}}, {"edge_b", {0, 2, 0}}});
     if (paddle == "mesh") scene.surface(paddle, {}, test::box_mesh({-1, -1, -0.1}, {1, 1, 0}, 3));
-    scene.setup.walls.back().motion = {test::rotation(-Vec3::UnitY(), Vec3::Zero(), rate)};
+    scene.setup.walls.back().motion = {rotation_part(-Vec3::UnitY(), Vec3::Zero(), rate)};
     scene.sphere(away + Vec3(0, 0, radius), radius, mass);
     Experiment run(std::move(scene));
     double impulse = 0;

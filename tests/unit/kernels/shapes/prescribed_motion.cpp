@@ -8,13 +8,9 @@
 #include <cmath>
 
 #include "kernels/shapes/walls.hpp"
-#include "tests/unit/motion_makers.hpp"
 
 namespace talus::prescribed_motion_test {
 namespace {
-
-using test::oscillation;
-using test::rotation;
 
 constexpr double two_pi = 6.28318530717958648;
 
@@ -33,7 +29,7 @@ Vec3 carried(const RigidVelocity& twist, const Vec3& from, double h) {
 }
 
 TEST(PrescribedMotion, RotationTurnsAboutItsLine) {
-  const std::vector<MotionPart> parts = {rotation({0, 0, 2}, {1, 0, 5}, 0.5)};
+  const std::vector<MotionPart> parts = {rotation_part({0, 0, 2}, {1, 0, 5}, 0.5)};
   const double angle = 0.5 * 3;
   const Pose pose = pose_at(parts, 3);
   EXPECT_LT((pose.of({2, 0, 1}) - Vec3(1 + std::cos(angle), std::sin(angle), 1)).norm(), 1e-15);
@@ -42,7 +38,7 @@ TEST(PrescribedMotion, RotationTurnsAboutItsLine) {
 }
 
 TEST(PrescribedMotion, OscillationBeginsWhereTheWallIs) {
-  const std::vector<MotionPart> parts = {oscillation({0, 3, 4}, 0.2, 5, 0.7)};
+  const std::vector<MotionPart> parts = {oscillation_part({0, 3, 4}, 0.2, 5, 0.7)};
   EXPECT_EQ(pose_at(parts, 0).of({1, 2, 3}), Vec3(1, 2, 3));
   const double t = 0.123, way = 0.2 * (std::sin(two_pi * 5 * t + 0.7) - std::sin(0.7));
   EXPECT_LT((pose_at(parts, t).of({1, 2, 3}) - Vec3(1, 2 + 0.6 * way, 3 + 0.8 * way)).norm(), 1e-15);
@@ -52,14 +48,14 @@ TEST(PrescribedMotion, RotationsFollowOneAnotherAboutLinesInSpaceAndDisplacement
   MotionPart drift;
   drift.velocity = {1, 0, 0};
   const double quarter = two_pi / 4;
-  const std::vector<MotionPart> parts = {rotation({0, 0, 1}, Vec3::Zero(), quarter), drift,
-                                         rotation({1, 0, 0}, Vec3::Zero(), quarter)};
+  const std::vector<MotionPart> parts = {rotation_part({0, 0, 1}, Vec3::Zero(), quarter), drift,
+                                         rotation_part({1, 0, 0}, Vec3::Zero(), quarter)};
   // After 1 s: x goes to y and then to z.
   EXPECT_LT((pose_at(parts, 1).of({1, 0, 0}) - Vec3(1, 0, 1)).norm(), 1e-15);
 }
 
 TEST(PrescribedMotion, LiesStillBeforeItBeginsAndAfterItHasEnded) {
-  MotionPart part = rotation({0, 0, 1}, Vec3::Zero(), 1);
+  MotionPart part = rotation_part({0, 0, 1}, Vec3::Zero(), 1);
   part.begin = 2;
   part.end = 3;
   EXPECT_EQ(displacement(part, 1).angle, 0);
@@ -72,11 +68,11 @@ TEST(PrescribedMotion, LiesStillBeforeItBeginsAndAfterItHasEnded) {
 
 TEST(PrescribedMotion, TwistOfAStepBringsEveryPointWhereThePoseHasIt) {
   const std::vector<std::vector<MotionPart>> motions = {
-      {rotation({1, 2, 3}, {0.3, -0.2, 0.5}, 1.7)},
-      {oscillation({1, 1, 0}, 0.1, 3, 0.4)},
-      {rotation({1, 2, 3}, {0.3, -0.2, 0.5}, 1.7), oscillation({1, 1, 0}, 0.1, 3, 0.4)},
-      {rotation({0, 0, 1}, {1, 0, 0}, 2), rotation({1, 0, 1}, {0, 0.3, 0}, -1.2),
-       oscillation({1, 0, 0}, 0.1, 3, 0)}};
+      {rotation_part({1, 2, 3}, {0.3, -0.2, 0.5}, 1.7)},
+      {oscillation_part({1, 1, 0}, 0.1, 3, 0.4)},
+      {rotation_part({1, 2, 3}, {0.3, -0.2, 0.5}, 1.7), oscillation_part({1, 1, 0}, 0.1, 3, 0.4)},
+      {rotation_part({0, 0, 1}, {1, 0, 0}, 2), rotation_part({1, 0, 1}, {0, 0.3, 0}, -1.2),
+       oscillation_part({1, 0, 0}, 0.1, 3, 0)}};
   const double t = 0.37, h = 0.05;
   for (std::size_t m = 0; m < motions.size(); ++m) {
     const RigidVelocity twist = mean_velocity(motions[m], t, h);
@@ -89,7 +85,7 @@ TEST(PrescribedMotion, TwistOfAStepBringsEveryPointWhereThePoseHasIt) {
 }
 
 TEST(PrescribedMotion, RateOfARotationIsExactHoweverShortTheStepAndLateTheTime) {
-  const std::vector<MotionPart> parts = {rotation({0, 1, 0}, Vec3::Zero(), -2)};
+  const std::vector<MotionPart> parts = {rotation_part({0, 1, 0}, Vec3::Zero(), -2)};
   const RigidVelocity twist = mean_velocity(parts, 1e5, 1e-6);
   EXPECT_NEAR(twist.omega[1], -2, 1e-14);
   EXPECT_EQ(twist.velocity, Vec3::Zero());
@@ -116,7 +112,7 @@ TEST(PrescribedMotion, TableOfVelocitiesIsIntegrated) {
 
 TEST(PrescribedMotion, SurfaceThatMovesAloneStaysAndItsMaterialMovesAlongIt) {
   Wall wall;
-  MotionPart part = rotation({0, 0, 1}, {1, 0, 0}, 2);
+  MotionPart part = rotation_part({0, 0, 1}, {1, 0, 0}, 2);
   part.surface_only = true;
   MotionPart along;
   along.velocity = {0, 1, 5};
@@ -133,7 +129,7 @@ TEST(PrescribedMotion, OfABeltGoesWithItsWall) {
   MotionPart part;
   part.velocity = {1, 0, 0};
   part.surface_only = true;
-  const std::vector<MotionPart> parts = {rotation({0, 0, 1}, Vec3::Zero(), two_pi / 4), part};
+  const std::vector<MotionPart> parts = {rotation_part({0, 0, 1}, Vec3::Zero(), two_pi / 4), part};
   EXPECT_LT((mean_surface_velocity(parts, 1, 1e-3, Vec3::Zero()).velocity - Vec3(0, 1, 0)).norm(), 1e-12);
 }
 
