@@ -22,7 +22,7 @@ struct Floors {
   double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
-  double corrected = 1e-8;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
+  double corrected = 1e-7;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
   double undone = 2;        ///< of what is undone of all overlaps: how far that may shift a grain
 };
 constexpr Floors floors;
