@@ -125,7 +125,9 @@ void look_for_checkpoint(const RunOptions& options, const graph::Communicator& r
   const EarlierRun earlier = earlier_run(run.directory);
   if (run.point) {
     compare_scenes(run.scene, run.resolved, *run.point);
-    if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
+    // The end may have been moved back to where it was when the checkpoint was written.
+    if (earlier.complete && run.point->changes.empty() && has_ends_of(run.directory, run.scene))
+      run.nothing_left = earlier.exit_code;
     const std::int64_t step = run.point->file.state.head.report.step;
     if (!run.nothing_left && earlier.done && options.steps && step >= *options.steps) {
       run.nothing_left = earlier.exit_code;

@@ -48,6 +48,10 @@ std::string fault_of_results(const std::filesystem::path& directory, const io::O
 /// another one what a checkpoint would let change.
 void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done);
 
+/// Whether the ends that the last run in a directory went for are those of this scene; true where nobody can
+/// read there which they were.
+bool has_ends_of(const std::filesystem::path& directory, const io::Scene& scene);
+
 /// Completes the scene with what the checkpoint knows: how many subdomains, and where the walls stood at
 /// first.
 void take_over(const ResumePoint& point, io::Scene& scene);

@@ -183,8 +183,12 @@ void warn_of_unreached(const Terminal& terminal, const RunOptions& options, std:
 }
 
 /// A run that is done may have left something undone: what was asked for, or more that the scene has.
-void add_undone(const RunOptions& options, io::Summary& summary) {
+void add_undone(const RunOptions& options, const ResumePoint* resume, io::Summary& summary) {
   std::vector<std::string> undone;
+  if (resume != nullptr && summary.complete && resume->file.state.head.report.step == summary.steps &&
+      std::ranges::any_of(resume->changes, io::moves_an_end))
+    undone.push_back(fmt::format("no step was made: the run had passed the end that it has now; it stays at {}",
+                                 counted(static_cast<std::size_t>(summary.steps), "step")));
   if (!summary.complete)
     undone.push_back(fmt::format("stopped after {} by --steps; the scene has more",
                                  counted(static_cast<std::size_t>(summary.steps), "step")));
@@ -302,7 +306,7 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
     if (tally.unconverged > 0 && !scene.setup.allow_unconverged) summary.exit_code = exit_tolerance_missed;
     const bool last_stage = simulation.stage_index() + 1 == scene.setup.stages.size();
     summary.complete = last_stage && simulation.stage_fraction() >= 1;
-    add_undone(options, summary);
+    add_undone(options, run.resume, summary);
     if (ranks.rank() == 0) warn_of_unreached(terminal, options, summary.steps);
   }
   summary.digest = simulation.digest();

@@ -66,13 +66,16 @@ Leaves leaves_of(const std::string& scene) {
   return leaves;
 }
 
+bool is_of_an_end(const std::string& key) {
+  return key.starts_with("stage.") && key.find(".end.") != std::string::npos;
+}
+
 bool may_change(const std::string& key) {
   for (const std::string_view front :
        {"output.", "checkpoint.", "decomposition.mapping", "decomposition.overlap", "solver.simd",
         "description", "name", "allow_unconverged"})
     if (key.starts_with(front)) return true;
-  if (key.starts_with("stage."))
-    return key.find(".end.") != std::string::npos || key.find(".load.") != std::string::npos;
+  if (key.starts_with("stage.")) return is_of_an_end(key) || key.find(".load.") != std::string::npos;
   if (key.starts_with("probe.")) return key.ends_with(".every") || key.ends_with(".every_steps");
   constexpr std::array<std::string_view, 7> loads{"drive",  "pressure",           "force", "velocity", "mass",
                                                   "weight", "tangential_velocity"};
@@ -104,6 +107,10 @@ std::vector<SceneChange> scene_changes(const std::string& was, const std::string
   std::vector<SceneChange> sorted;
   for (auto& [key, change] : changes) sorted.push_back(std::move(change));
   return sorted;
+}
+
+bool moves_an_end(const SceneChange& change) {
+  return is_of_an_end(change.key);
 }
 
 std::string describe(const SceneChange& change) {

@@ -20,6 +20,9 @@ struct SceneChange {
 /// Keys that differ between two texts of resolved_scene, in order of their names.
 std::vector<SceneChange> scene_changes(const std::string& was, const std::string& is);
 
+/// Whether it moves the end of a stage.
+bool moves_an_end(const SceneChange& change);
+
 /// "stage.shear.friction was 0.35 and is 0.5".
 std::string describe(const SceneChange& change);
 

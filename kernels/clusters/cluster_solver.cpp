@@ -61,13 +61,17 @@ std::vector<Twist> exchanged(const BodyProblem& problem) {
   return change;
 }
 
+bool meets_law(const LawDefect& defect, const ClusterGoal& goal, const ClusterThresholds& thresholds) {
+  return defect.worst <= thresholds.same_law * goal.relative * defect.largest;
+}
+
 /// Redundant contacts share forces by gaps that differ by no more than rounding, and by less than what the
 /// step before was certified to: an answer that shares them otherwise is none that is better. So impulses
 /// stay that meet the law themselves and give the velocities of the answer (ClusterThresholds::same_law),
 /// also by the scale of what contacts do, beside which walls may press much harder.
 bool as_good(const BodyProblem& problem, const ClusterAnswer& answer, const LawDefect& defect,
              const ClusterGoal& goal, const ClusterThresholds& thresholds) {
-  if (!answer.solved || !(defect.worst <= thresholds.same_law * goal.relative * defect.largest)) return false;
+  if (!answer.solved || !meets_law(defect, goal, thresholds)) return false;
   const std::vector<Twist> done = exchanged(problem);
   const double apart = std::min(goal.enough, goal.relative * momentum_of(problem, done));
   const double norm =
@@ -146,6 +150,22 @@ void solve_by_matrix(const BodyProblem& problem, double enough, double work,
   }
 }
 
+/// Without friction, of impulses that meet the law: the velocities of the answer, which take less than forces
+/// that bodies share by gaps of next to nothing; and impulses that give them and meet the law as well. False
+/// where there are none.
+bool velocities_suffice(const BodyProblem& problem, ClusterGoal goal, const ClusterThresholds& thresholds,
+                        double& work, ClusterAnswer& answer) {
+  if (!meets_law(law_defect(problem, problem.impulse), goal, thresholds)) return false;
+  goal.forces = false;
+  ClusterAnswer other = answer_of(
+      problem, problem, proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, work));
+  std::vector<Vec3> changed(problem.impulse);
+  for (std::size_t k = 0; k < changed.size(); ++k) changed[k] += other.impulse[k];
+  if (!other.solved || !meets_law(law_defect(problem, changed), goal, thresholds)) return false;
+  answer = std::move(other);
+  return true;
+}
+
 /// What follows where rounds have not settled. `answer`: theirs, in; the best, out.
 void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThresholds& thresholds,
             ClusterAnswer& answer) {
@@ -160,11 +180,13 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   double left = thresholds.admissible_share * budget;
   answer.jammed = !problem.has_cell() && none_admissible(problem, goal.enough, thresholds.admissible, left);
   if (answer.jammed) return;
+  left += (has_friction(problem) ? thresholds.coulomb_share : thresholds.proximal_share) * budget;
   if (has_friction(problem)) {
-    left += thresholds.coulomb_share * budget;
     take(coulomb_correction(problem, goal, thresholds.correction, thresholds.coulomb, left));
+    left += thresholds.proximal_share * budget;
+  } else if (velocities_suffice(problem, goal, thresholds, left, answer)) {
+    return;
   }
-  left += thresholds.proximal_share * budget;
   if (!answer.solved)
     take(proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;

@@ -58,6 +58,7 @@ struct ClusterGoal {
   int sweeps = 0;       ///< that the step has had: what an answer may cost grows with them
   double still =
       0;  ///< [m/s]: slower normal velocities may be rounding of positions, and say nothing of forces
+  bool forces = true;  ///< without friction: impulses are to be known as well as velocities
 };
 
 /// What would set all contacts right, and how well that is known. Momenta are sum m |u| + (I/R^2) |w|.

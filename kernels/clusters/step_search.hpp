@@ -97,7 +97,8 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     now.missed = comparable ? rest_of(moved, now.moved, search.inner * goal) : now.moved;
     now.pushed = pushed_by(problem, impulse, now.impulse);
     // In directions that W hardly resists impulses creep the further the firmer a step is.
-    bool known = friction || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
+    bool known =
+        friction || !asked.forces || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
     if constexpr (requires { steps.to_come(now, asked, work); })

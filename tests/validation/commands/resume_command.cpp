@@ -159,6 +159,24 @@ TEST_F(Resume, IsTheSameLineUntilItIsDone) {
             "stage.shear.end.steps was 200 and is 210");
 }
 
+// An end moved before where the run is, and back to where it was at the checkpoint.
+TEST_F(Resume, GoesOnToItsFirstEndBehindANearerOne) {
+  const std::string line = "run scene.toml --out out --threads 1 --resume";
+  ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
+  ASSERT_EQ(run(line + " --steps 9").code, 0);
+  const Outcome nearer = run(line + " --set stage.shear.end.steps=2");
+  EXPECT_EQ(nearer.code, 0) << nearer.messages;
+  EXPECT_NE(nearer.messages.find("no step was made"), std::string::npos) << nearer.messages;
+  EXPECT_EQ(summary(at("out")).at("steps"), 9);
+  const Outcome back = run(line);
+  EXPECT_EQ(back.code, 0) << back.messages;
+  EXPECT_EQ(summary(at("out")).at("steps"), 12);
+  EXPECT_EQ(summary(at("out")).at("digest"), summary(at("straight")).at("digest"));
+  EXPECT_EQ(content(at("out/walls.csv")), content(at("straight/walls.csv")));
+  const Outcome again = run(line);
+  EXPECT_NE(again.messages.find("is done"), std::string::npos) << again.messages;
+}
+
 TEST_F(Resume, EndsWithTheCodeOfStepsThatMiss) {
   const std::string line =
       "run scene.toml --out out --threads 1 --resume --set solver.max_iterations=3 --set "
