@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <memory>
 
 #include "tests/validation/experiment.hpp"
@@ -48,6 +50,45 @@ TEST(Lid, FallsFreely) {
   run.steps(100);
   EXPECT_NEAR(run.simulation().walls()[0].velocity, g_earth * run.time(), 1e-12) << "along its normal";
   EXPECT_NEAR(run.simulation().walls()[0].position, -1 + 0.5 * g_earth * run.time() * run.time(), 1e-12);
+}
+
+/// Smooth balls packed closely between five walls: gaps of next to nothing decide who of redundant contacts
+/// carries, and no search for that ends.
+Scene packed_under_lid(int edge, int layers) {
+  const double step = radius * std::sqrt(2.0), side = 2 * radius * edge;
+  Scene scene(1e-4);
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.wall("lid", {0, 0, 2 * radius + (layers - 1) * step}, -Vec3::UnitZ()).load = lid(false, 5000);
+  for (const int axis : {0, 1}) {
+    scene.wall("low", Vec3::Zero(), Vec3::Unit(axis)).name += axis == 0 ? "x" : "y";
+    scene.wall("high", side * Vec3::Unit(axis), -Vec3::Unit(axis)).name += axis == 0 ? "x" : "y";
+  }
+  scene.stage().gravity = {0, 0, -g_earth};
+  for (int layer = 0; layer < layers; ++layer) {
+    const int row = edge - layer % 2;  // those of odd layers lie in the hollows of the others
+    for (int k = 0; k < row * row; ++k)
+      scene.sphere(radius * Vec3(1 + layer % 2 + 2 * (k % row), 1 + layer % 2 + 2 * (k / row), 1) +
+                       Vec3(0, 0, layer * step),
+                   radius, 0.01);
+  }
+  scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-3;
+  scene.setup.solver.max_iterations = 2000;
+  scene.setup.solver.check_every = 10;
+  return scene;
+}
+
+TEST(Lid, OnCloselyPackedSmoothBallsRestsThoughNobodyKnowsWhichOfThemCarry) {
+  Experiment run(packed_under_lid(4, 5));
+  const double weight = 66 * 0.01 * g_earth;
+  std::int64_t sweeps = 0;
+  for (int k = 1; k <= 8; ++k) {
+    const StepReport& report = run.step();
+    ASSERT_TRUE(report.converged) << "step " << k;
+    sweeps += report.iterations;
+    EXPECT_NEAR(run.wall_force(0)[2], 5000 + weight, 1e-3 * (5000 + weight)) << k;
+    EXPECT_NEAR(run.wall_force(1)[2], -5000, 1e-3 * 5000) << k;
+  }
+  EXPECT_LT(sweeps, 1000) << "by sweeps that go on until direct solves may cost more";
 }
 
 TEST(Lid, ThatIsDraggedRollsItsBallsUnderConstantForce) {
