@@ -31,6 +31,31 @@ void add_density(const std::string& where, double density, std::vector<std::stri
     warnings.push_back(fmt::format("{} has a density of {:g} kg/m^3, more than any element", where, density));
 }
 
+/// Coefficients of friction: silicone rubber on glass comes to 2 or 3.
+constexpr double roughest = 5;
+
+void add_friction(const io::Scene& scene, std::vector<std::string>& warnings) {
+  double mu = 0;
+  for (const Stage& stage : scene.setup.stages)
+    for (Material a = 0; stage.laws.knows(a); ++a)
+      for (Material b = 0; b <= a; ++b) mu = std::max(mu, stage.laws.between(a, b).friction);
+  if (mu > roughest)
+    warnings.push_back(fmt::format(
+        "a coefficient of friction is {0:g}, more than surfaces have; {0:g} % are {1:g}", mu, mu / 100));
+}
+
+/// A belt moves along its surface only: of a motion along the normal nothing is left.
+void add_still_belts(const io::Scene& scene, std::vector<std::string>& warnings) {
+  for (const Wall& wall : scene.setup.walls)
+    for (const MotionPart& motion : wall.motion) {
+      const Vec3 along = motion.velocity - motion.velocity.dot(wall.normal) * wall.normal;
+      if (motion.surface_only && wall.surface() == nullptr && motion.velocity.norm() > 0 &&
+          along.norm() < 1e-9 * motion.velocity.norm())
+        warnings.push_back(
+            fmt::format("the surface of wall '{}' is to move along its normal: it stands still", wall.name));
+    }
+}
+
 /// Surfaces may stand anywhere.
 bool stands_against(const Wall& wall, const Vec3& gravity) {
   return wall.surface() != nullptr || wall.normal.dot(gravity) < 0;
@@ -194,6 +219,8 @@ std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sa
   add_segregation(scene, sample, warnings);
   add_idle_rolling(scene, sample, warnings);
   add_jumps(scene, warnings);
+  add_friction(scene, warnings);
+  add_still_belts(scene, warnings);
   if (const auto parts = static_cast<std::size_t>(scene.setup.decomposition.subdomains);
       parts > std::max<std::size_t>(1, sample.size()) && scene.setup.inserts.empty())
     warnings.push_back(fmt::format("{} subdomains for {} grains: most of them hold none; fewer are faster",

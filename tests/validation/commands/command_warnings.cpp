@@ -66,6 +66,24 @@ TEST_F(Warnings, OfADensityInOtherUnits) {
       << "0.001 is no unit";
 }
 
+TEST_F(Warnings, OfFrictionInPerCent) {
+  EXPECT_NE(of(replaced(column_scene, "friction = 0.35", "friction = 35"))
+                .find("is 35, more than surfaces have; 35 % are 0.35"),
+            std::string::npos);
+  EXPECT_EQ(of(replaced(column_scene, "friction = 0.35", "friction = 2")), "");
+}
+
+TEST_F(Warnings, OfABeltThatIsToMoveAlongItsNormal) {
+  const auto belt = [](const std::string& velocity) {
+    return replaced(column_scene, "side = \"z-\"",
+                    "side = \"z-\"\n[[wall.motion]]\nkind = \"velocity\"\nvelocity = " + velocity +
+                        "\nsurface_only = true");
+  };
+  EXPECT_NE(of(belt("[0, 0, 0.5]")).find("surface of wall 'floor' is to move along its normal"),
+            std::string::npos);
+  EXPECT_EQ(of(belt("[0.1, 0, 0.5]")), "");
+}
+
 TEST_F(Warnings, OfRollingResistanceWithoutFriction) {
   EXPECT_NE(of(replaced(column_scene, "friction = 0.35",
                         "friction = 0.35\nwall_friction = 0\nrolling_resistance = 0.1"))
