@@ -150,18 +150,16 @@ void solve_by_matrix(const BodyProblem& problem, double enough, double work,
   }
 }
 
-/// Without friction, of impulses that meet the law: the velocities of the answer, which take less than forces
-/// that bodies share by gaps of next to nothing; and impulses that give them and meet the law as well. False
-/// where there are none.
+/// Without friction, of impulses that meet the law: whether they give the velocities of the answer, which
+/// take less to be known than forces that bodies share by gaps of next to nothing. `answer`: that they do.
 bool velocities_suffice(const BodyProblem& problem, ClusterGoal goal, const ClusterThresholds& thresholds,
                         double& work, ClusterAnswer& answer) {
-  if (!meets_law(law_defect(problem, problem.impulse), goal, thresholds)) return false;
+  const LawDefect defect = law_defect(problem, problem.impulse);
+  if (!meets_law(defect, goal, thresholds)) return false;
   goal.forces = false;
   ClusterAnswer other = answer_of(
       problem, problem, proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, work));
-  std::vector<Vec3> changed(problem.impulse);
-  for (std::size_t k = 0; k < changed.size(); ++k) changed[k] += other.impulse[k];
-  if (!other.solved || !meets_law(law_defect(problem, changed), goal, thresholds)) return false;
+  if (!as_good(problem, other, defect, goal, thresholds)) return false;
   answer = std::move(other);
   return true;
 }
