@@ -123,11 +123,14 @@ void look_for_checkpoint(const RunOptions& options, const graph::Communicator& r
                          const Terminal& terminal, Prepared& run) {
   run.point = find_resume_point(run.directory, run.scene, ranks, terminal);
   const EarlierRun earlier = earlier_run(run.directory);
+  // A run that makes no step takes no checkpoint: only what lies beside it tells that its end was a nearer
+  // one. Rank 0 asks for all, as for checkpoints.
+  double ended[1] = {ranks.rank() == 0 && earlier.complete && has_ends_of(run.directory, run.scene) ? 1.
+                                                                                                    : 0.};
+  ranks.max(ended);
   if (run.point) {
     compare_scenes(run.scene, run.resolved, *run.point);
-    // The end may have been moved back to where it was when the checkpoint was written.
-    if (earlier.complete && run.point->changes.empty() && has_ends_of(run.directory, run.scene))
-      run.nothing_left = earlier.exit_code;
+    if (ended[0] > 0 && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
     const std::int64_t step = run.point->file.state.head.report.step;
     if (!run.nothing_left && earlier.done && options.steps && step >= *options.steps) {
       run.nothing_left = earlier.exit_code;

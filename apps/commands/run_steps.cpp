@@ -187,8 +187,9 @@ void add_undone(const RunOptions& options, const ResumePoint* resume, io::Summar
   std::vector<std::string> undone;
   if (resume != nullptr && summary.complete && resume->file.state.head.report.step == summary.steps &&
       std::ranges::any_of(resume->changes, io::moves_an_end))
-    undone.push_back(fmt::format("no step was made: the run had passed the end that it has now; it stays at {}",
-                                 counted(static_cast<std::size_t>(summary.steps), "step")));
+    undone.push_back(
+        fmt::format("no step was made: the run was at the end that it has now, or beyond; it stays at {}",
+                    counted(static_cast<std::size_t>(summary.steps), "step")));
   if (!summary.complete)
     undone.push_back(fmt::format("stopped after {} by --steps; the scene has more",
                                  counted(static_cast<std::size_t>(summary.steps), "step")));

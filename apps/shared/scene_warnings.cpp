@@ -40,20 +40,21 @@ void add_friction(const io::Scene& scene, std::vector<std::string>& warnings) {
     for (Material a = 0; stage.laws.knows(a); ++a)
       for (Material b = 0; b <= a; ++b) mu = std::max(mu, stage.laws.between(a, b).friction);
   if (mu > roughest)
-    warnings.push_back(fmt::format(
-        "a coefficient of friction is {0:g}, more than surfaces have; {0:g} % are {1:g}", mu, mu / 100));
+    warnings.push_back(fmt::format("a coefficient of friction is {:g}, more than surfaces have{}", mu,
+                                   mu <= 100 ? fmt::format("; {:g} % are {:g}", mu, mu / 100) : ""));
 }
 
-/// A belt moves along its surface only: of a motion along the normal nothing is left.
+/// A belt moves along its surface only: of a motion along the normal nothing but rounding is left.
 void add_still_belts(const io::Scene& scene, std::vector<std::string>& warnings) {
-  for (const Wall& wall : scene.setup.walls)
-    for (const MotionPart& motion : wall.motion) {
-      const Vec3 along = motion.velocity - motion.velocity.dot(wall.normal) * wall.normal;
-      if (motion.surface_only && wall.surface() == nullptr && motion.velocity.norm() > 0 &&
-          along.norm() < 1e-9 * motion.velocity.norm())
-        warnings.push_back(
-            fmt::format("the surface of wall '{}' is to move along its normal: it stands still", wall.name));
-    }
+  constexpr double rounding = 1e-9;
+  for (const Wall& wall : scene.setup.walls) {
+    if (wall.motion.size() != 1 || !wall.motion[0].surface_only || wall.surface() != nullptr) continue;
+    const MotionPart& motion = wall.motion[0];
+    const Vec3& way = motion.kind == MotionPart::Kind::oscillation ? motion.direction : motion.velocity;
+    if (way.norm() > 0 && (way - way.dot(wall.normal) * wall.normal).norm() < rounding * way.norm())
+      warnings.push_back(
+          fmt::format("the surface of wall '{}' is to move along its normal: it stands still", wall.name));
+  }
 }
 
 /// Surfaces may stand anywhere.

@@ -102,12 +102,14 @@ void draw_stress(Draws& draws, double p, bool leaning, StressLoad& stress) {
     for (std::size_t k = 3; k < 6; ++k) stress.to[k] = leaning ? p * draws.between(-0.25, 0.25) : 0;
 }
 
-/// One component strained or sheared at `rate` [1/s]. Ten steps press it together by a fifth at most: grains
-/// must not touch their own images.
+/// Over the time of a step: pressed together faster the grains of a cell would soon touch their own images.
+constexpr double most_pressed = 0.02;
+
+/// One component strained or sheared at `rate` [1/s].
 void draw_rate(Draws& draws, double rate, Stage& stage) {
   const auto axis = static_cast<Eigen::Index>(draws.below(3));
   const bool shears = draws.chance(0.5);
-  const double least = shears ? -rate : std::max(-rate, -0.02 / stage.time_step);
+  const double least = shears ? -rate : std::max(-rate, -most_pressed / stage.time_step);
   (shears ? stage.shear_rates : stage.strain_rates)[axis] = draws.chance(0.5) ? rate : least;
   stage.stress.to[static_cast<std::size_t>(axis) + (shears ? 3 : 0)].reset();
 }
@@ -144,7 +146,10 @@ void make_cell(SceneBench& bench) {
   for (auto& component : stage.stress.to)
     if (component) *component *= factor;
   if (load == CellLoad::deviatoric) draw_stress(draws, p, true, stage.stress);
-  if (draws.chance(0.5)) stage.strain_rates *= -1, stage.shear_rates *= -1;
+  if (draws.chance(0.5)) {
+    stage.strain_rates = (-stage.strain_rates).cwiseMax(-most_pressed / stage.time_step);
+    stage.shear_rates *= -1;
+  }
   bench.cell_stages.push_back(stage);
 }
 

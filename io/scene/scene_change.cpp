@@ -66,8 +66,10 @@ Leaves leaves_of(const std::string& scene) {
   return leaves;
 }
 
-bool is_of_an_end(const std::string& key) {
-  return key.starts_with("stage.") && key.find(".end.") != std::string::npos;
+/// Whether the key is of this table of a stage, whose own name may be the same.
+bool is_of_stage(const std::string& key, const std::string_view table) {
+  const std::string_view front = "stage.";
+  return key.starts_with(front) && key.find(table, front.size()) != std::string::npos;
 }
 
 bool may_change(const std::string& key) {
@@ -75,7 +77,7 @@ bool may_change(const std::string& key) {
        {"output.", "checkpoint.", "decomposition.mapping", "decomposition.overlap", "solver.simd",
         "description", "name", "allow_unconverged"})
     if (key.starts_with(front)) return true;
-  if (key.starts_with("stage.")) return is_of_an_end(key) || key.find(".load.") != std::string::npos;
+  if (is_of_stage(key, ".end.") || is_of_stage(key, ".load.")) return true;
   if (key.starts_with("probe.")) return key.ends_with(".every") || key.ends_with(".every_steps");
   constexpr std::array<std::string_view, 7> loads{"drive",  "pressure",           "force", "velocity", "mass",
                                                   "weight", "tangential_velocity"};
@@ -110,7 +112,7 @@ std::vector<SceneChange> scene_changes(const std::string& was, const std::string
 }
 
 bool moves_an_end(const SceneChange& change) {
-  return is_of_an_end(change.key);
+  return is_of_stage(change.key, ".end.");
 }
 
 std::string describe(const SceneChange& change) {

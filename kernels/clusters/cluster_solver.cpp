@@ -153,7 +153,7 @@ void solve_by_matrix(const BodyProblem& problem, double enough, double work,
 /// Without friction, of impulses that meet the law: whether they give the velocities of the answer, which
 /// take less to be known than forces that bodies share by gaps of next to nothing. `answer`: that they do.
 bool velocities_suffice(const BodyProblem& problem, ClusterGoal goal, const ClusterThresholds& thresholds,
-                        double& work, ClusterAnswer& answer) {
+                        double work, ClusterAnswer& answer) {
   const LawDefect defect = law_defect(problem, problem.impulse);
   if (!meets_law(defect, goal, thresholds)) return false;
   goal.forces = false;
@@ -178,13 +178,13 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   double left = thresholds.admissible_share * budget;
   answer.jammed = !problem.has_cell() && none_admissible(problem, goal.enough, thresholds.admissible, left);
   if (answer.jammed) return;
-  left += (has_friction(problem) ? thresholds.coulomb_share : thresholds.proximal_share) * budget;
   if (has_friction(problem)) {
+    left += thresholds.coulomb_share * budget;
     take(coulomb_correction(problem, goal, thresholds.correction, thresholds.coulomb, left));
-    left += thresholds.proximal_share * budget;
-  } else if (velocities_suffice(problem, goal, thresholds, left, answer)) {
+  } else if (velocities_suffice(problem, goal, thresholds, thresholds.coulomb_share * budget, answer)) {
     return;
   }
+  left += thresholds.proximal_share * budget;
   if (!answer.solved)
     take(proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;

@@ -26,7 +26,8 @@ struct ClusterThresholds {
   /// Beyond it the cluster is left without an answer.
   double least_budget = 500, budget_per_sweep = 20;
   /// Parts of it that the question whether there is an answer, and the steps of coulomb_newton.hpp and
-  /// proximal_newton.hpp may take, together in (0, 1); each has also what those before it leave.
+  /// proximal_newton.hpp may take, together in (0, 1); each has also what those before it leave. Without
+  /// friction the second is that of steps which ask for the velocities alone.
   double admissible_share = 0.05, coulomb_share = 0.5, proximal_share = 0.4;
   /// Impulses are kept as they are, however far the answer that was found is from them, where they give its
   /// velocities to this part of what need not be told apart, in (0, 1), and no contact is further from its
@@ -51,18 +52,20 @@ struct ClusterAnswer {
   std::vector<Vec3> found;    ///< per contact: `impulse` where solved; else what the best of the rounds would
                               ///< change, an estimate of what r is off by [N s]
   double error = 0;           ///< momentum of the motion, and what is not known of it [N s]
-  bool solved = false;        ///< impulses and velocities satisfy the law but for what is small
-  bool helps = false;         ///< with the change they are nearer to it than before
-  bool jammed = false;        ///< there is none: none_admissible
+  bool solved = false;  ///< impulses and velocities satisfy the law but for what is small; impulses that
+                        ///< stay, also where others would share forces among redundant contacts
+  bool helps = false;   ///< with the change they are nearer to it than before
+  bool jammed = false;  ///< there is none: none_admissible
 };
 
 /// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, and there may be an
 /// answer (admissible.hpp), proximal steps, with friction first those of coulomb_newton.hpp, then
-/// proximal_newton.hpp; and where these do not either, with what is left of the budget the solvers that keep
-/// W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there; not
-/// where steps of all kinds were stuck (Correction::stuck). All by counted work, so the same bits come out
-/// every time. The changed impulses lie on the cones. Values that are not finite come back as an error that
-/// is not.
+/// proximal_newton.hpp, which without friction ask first for the velocities alone, and end where these are
+/// those of impulses that meet the law; and where these do not either, with what is left of the budget the
+/// solvers that keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again
+/// from there; not where steps of all kinds were stuck (Correction::stuck). All by counted work, so the same
+/// bits come out every time. The changed impulses lie on the cones. Values that are not finite come back as
+/// an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

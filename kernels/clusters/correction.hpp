@@ -56,9 +56,11 @@ struct ClusterGoal {
   double enough = 0;    ///< momentum that need not be told apart [N s]
   double relative = 0;  ///< the same over the cluster's scale
   int sweeps = 0;       ///< that the step has had: what an answer may cost grows with them
-  double still =
-      0;  ///< [m/s]: slower normal velocities may be rounding of positions, and say nothing of forces
-  bool forces = true;  ///< without friction: impulses are to be known as well as velocities
+  /// [m/s]: slower normal velocities may be rounding of positions, and say nothing of forces.
+  double still = 0;
+  /// Without friction: impulses are to be known as well as velocities. Else those of an answer may not be
+  /// taken, though it is settled.
+  bool forces = true;
 };
 
 /// What would set all contacts right, and how well that is known. Momenta are sum m |u| + (I/R^2) |w|.

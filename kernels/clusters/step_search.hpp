@@ -96,9 +96,10 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     const bool comparable = small && firmness >= last;
     now.missed = comparable ? rest_of(moved, now.moved, search.inner * goal) : now.moved;
     now.pushed = pushed_by(problem, impulse, now.impulse);
-    // In directions that W hardly resists impulses creep the further the firmer a step is.
-    bool known =
-        friction || !asked.forces || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
+    // In directions that W hardly resists impulses creep the further the firmer a step is; where they need
+    // not be known only the firmest steps tell that velocities do not creep as well.
+    bool known = friction || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
+    if (!asked.forces) known = known || firmness >= thresholds.firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
     if constexpr (requires { steps.to_come(now, asked, work); })

@@ -71,6 +71,9 @@ TEST_F(Warnings, OfFrictionInPerCent) {
                 .find("is 35, more than surfaces have; 35 % are 0.35"),
             std::string::npos);
   EXPECT_EQ(of(replaced(column_scene, "friction = 0.35", "friction = 2")), "");
+  const std::string rough = of(replaced(column_scene, "friction = 0.35", "friction = 1e9"));
+  EXPECT_NE(rough.find("more than surfaces have"), std::string::npos);
+  EXPECT_EQ(rough.find('%'), std::string::npos) << "who wants no sliding says so by a large number";
 }
 
 TEST_F(Warnings, OfABeltThatIsToMoveAlongItsNormal) {

@@ -164,6 +164,8 @@ TEST_F(Resume, GoesOnToItsFirstEndBehindANearerOne) {
   const std::string line = "run scene.toml --out out --threads 1 --resume";
   ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
   ASSERT_EQ(run(line + " --steps 9").code, 0);
+  const Outcome there = run(line + " --set stage.shear.end.steps=3");
+  EXPECT_NE(there.messages.find("no step was made"), std::string::npos) << there.messages;
   const Outcome nearer = run(line + " --set stage.shear.end.steps=2");
   EXPECT_EQ(nearer.code, 0) << nearer.messages;
   EXPECT_NE(nearer.messages.find("no step was made"), std::string::npos) << nearer.messages;

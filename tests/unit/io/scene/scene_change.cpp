@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/unit/replaced.hpp"
 
 namespace talus::scene_change_test {
 namespace {
@@ -47,6 +51,20 @@ TEST(SceneChanges, AreNamedAsSetNamesThem) {
                       "refused: stage.shear.friction was 0.35 and is 0.5",
                       "stage.shear.load.z+.velocity was [0, 0, -0.05] and is [0, 0, -0.1]",
                       "wall.z+.pressure was 10000 and is 20000"}));
+}
+
+/// A stage may have the name of what may change in it.
+TEST(SceneChanges, AreThoseOfAStageWhateverItIsCalled) {
+  for (const std::string name : {"end", "load"}) {
+    const auto called = [&](const std::vector<std::string>& overrides) {
+      return test::replaced(resolved(overrides), "name = \"shear\"", "name = \"" + name + "\"");
+    };
+    const auto changes =
+        io::scene_changes(called({}), called({"stage.shear.friction=0.5", "stage.shear.end.steps=8"}));
+    ASSERT_EQ(changes.size(), 2U);
+    EXPECT_TRUE(changes[0].allowed && io::moves_an_end(changes[0])) << changes[0].key;
+    EXPECT_FALSE(changes[1].allowed || io::moves_an_end(changes[1])) << changes[1].key;
+  }
 }
 
 /// Or no run of before could be gone on with after a law has been added.
