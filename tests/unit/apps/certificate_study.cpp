@@ -279,9 +279,7 @@ TEST(CertificateAudit, OfALatticeWithFrictionWhoseForcesComeSlowlyIsNotDeceived)
 TEST(CertificateAudit, OfALatticeThatWallsPressByFarMoreThanMovesItIsNotDeceived) {
   // Without friction, in step 19, impulses that a search for the velocities alone has found meet the law to a
   // hundred-millionth, and are wrong by a quarter of the largest.
-  const AuditedRun run = audited(make_scene("lattice", 76, {}), 19, [](io::Scene& scene) {
-    scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-4;
-  });
+  const AuditedRun run = audited(make_scene("lattice", 76, {.tolerance = 1e-4}), 19);
   ASSERT_EQ(run.steps.size(), 19U);
   EXPECT_GE(within_their_claims(run), 10);
 }
