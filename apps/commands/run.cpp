@@ -18,7 +18,7 @@
 #include "apps/commands/run_messages.hpp"
 #include "apps/commands/run_ranks.hpp"
 #include "apps/commands/run_resume.hpp"
-#include "apps/commands/run_signals.hpp"
+#include "apps/shared/signals.hpp"
 #include "apps/commands/run_status.hpp"
 #include "apps/commands/run_steps.hpp"
 #include "apps/commands/step_list.hpp"

@@ -16,7 +16,7 @@
 #include "apps/commands/run_checkpoints.hpp"
 #include "apps/commands/run_limit.hpp"
 #include "apps/commands/run_messages.hpp"
-#include "apps/commands/run_signals.hpp"
+#include "apps/shared/signals.hpp"
 #include "apps/commands/run_status.hpp"
 #include "apps/commands/step_list.hpp"
 #include "apps/shared/exit_codes.hpp"

@@ -100,7 +100,7 @@ bool AuditedRun::gave_up() const {
 }
 
 AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
-                     const std::function<void(const AuditedStep&)>& progress) {
+                     const std::function<bool(const AuditedStep&)>& goes_on) {
   AuditedRun run;
   try {
     const SolverSettings& solver = scene.setup.solver;
@@ -142,7 +142,7 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       judge(problem, start, after, plan.limits, step);
       step.audit_seconds = seconds_since(audit_start);
       run.steps.push_back(std::move(step));
-      if (progress) progress(run.steps.back());
+      if (goes_on && !goes_on(run.steps.back())) break;
       run.of_run = true;
       simulation.begin_next_stage();
     }

@@ -56,9 +56,9 @@ struct AuditPlan {
   ReferenceLimits limits;
 };
 
-/// `scene` with walls placed, `bodies` its grains before the first step. `progress` is called behind every
+/// `scene` with walls placed, `bodies` its grains before the first step. `goes_on` is asked behind every
 /// step. Throws nothing: what the simulation throws is AuditedRun::ended.
 AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
-                     const std::function<void(const AuditedStep&)>& progress = {});
+                     const std::function<bool(const AuditedStep&)>& goes_on = {});
 
 }  // namespace talus::audit

@@ -16,6 +16,7 @@
 #include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/say.hpp"
+#include "apps/shared/signals.hpp"
 #include "apps/study_certificate/calibration.hpp"
 #include "apps/study_certificate/certificate_report.hpp"
 #include "apps/study_certificate/scene_maker.hpp"
@@ -50,15 +51,20 @@ class Progress {
     try {
       io::place_walls(placed, grains);
       append(grains, bodies);
-      run = audit_run(placed, bodies, plan, [&](const AuditedStep&) { say_where(scene.name); });
+      run = audit_run(placed, bodies, plan, [&](const AuditedStep&) {
+        say_where(scene.name);
+        return stop_signal() == 0;
+      });
     } catch (const std::exception& error) {
       run.ended = error.what();
     }
     if (!run.ended.empty()) (run.gave_up() ? gave_up : ended).push_back(scene.name + ": " + run.ended);
     const double tolerance = placed.setup.solver.tolerance;
     for (AuditedStep& step : run.steps) steps.push_back({scene.name, family, tolerance, std::move(step)});
-    ++done_;
+    if (stop_signal() == 0) ++done_;
   }
+
+  std::size_t done() const { return done_; }  ///< scenes
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
@@ -104,7 +110,7 @@ void audit_made(const StudyCertificateOptions& options, const fs::path& director
     settings.subdomains = std::max(1, options.subdomains);
     if (!options.coupling.empty()) settings.coupling = couplings().named(options.coupling).kind;
     std::multimap<double, MadeScene, std::greater<>> worst;
-    for (int k = 0; k < options.scenes; ++k) {
+    for (int k = 0; k < options.scenes && stop_signal() == 0; ++k) {
       const std::string& family = families[static_cast<std::size_t>(k) % families.size()];
       MadeScene made = make_scene(family, options.seed + static_cast<std::uint64_t>(k), settings);
       made.scene.name = fmt::format("{}-{:.0e}", made.name(), tolerance);
@@ -157,7 +163,8 @@ std::vector<io::Scene> given_scenes(const StudyCertificateOptions& options) {
 void audit_given(const StudyCertificateOptions& options, const std::vector<io::Scene>& scenes,
                  Progress& progress) {
   const AuditPlan plan{options.steps > 0 ? options.steps : std::numeric_limits<std::int64_t>::max(), {}};
-  for (const io::Scene& scene : scenes) progress.audit(scene, scene.name, build_sample(scene), plan);
+  for (const io::Scene& scene : scenes)
+    if (stop_signal() == 0) progress.audit(scene, scene.name, build_sample(scene), plan);
 }
 
 std::string summary_of(const Progress& progress, std::size_t scenes) {
@@ -171,7 +178,7 @@ std::string summary_of(const Progress& progress, std::size_t scenes) {
 
 int conclude(const Progress& progress, std::size_t scenes, const std::string& directory, bool by_family) {
   const std::vector<CalibrationRow> rows = calibrate(progress.steps);
-  const std::string summary = summary_of(progress, scenes);
+  const std::string summary = summary_of(progress, stop_signal() == 0 ? scenes : progress.done());
   print_out("{}\n{}\n", calibration_table(rows, by_family), summary);
   write_certificate_report(directory, progress.steps, rows, summary);
   say(fmt::format("calibration.csv, steps.csv, pictures and report.html in {}", directory));
@@ -180,7 +187,10 @@ int conclude(const Progress& progress, std::size_t scenes, const std::string& di
   for (const std::string& sentence : progress.gave_up)
     say(fmt::format("gave up, as its steps had said: {}", sentence));
   for (const std::string& sentence : progress.ended) print_error("talus: error: {}\n", sentence);
-  return broken.empty() && progress.ended.empty() ? exit_done : exit_failure;
+  if (!broken.empty() || !progress.ended.empty()) return exit_failure;
+  if (stop_signal() == 0) return exit_done;
+  say(fmt::format("stopped: {} after {} of {} scenes", signal_name(stop_signal()), progress.done(), scenes));
+  return exit_stopped;
 }
 
 }  // namespace
@@ -235,6 +245,7 @@ int study_certificate_command(const StudyCertificateOptions& options) {
   const std::string directory = options.out.empty() ? "out/study-certificate" : options.out;
   std::optional<io::DirectoryLock> lock;
   std::vector<io::Scene> given;
+  catch_signals();
   try {
     if (!options.scenes_from.empty()) given = given_scenes(options);
     lock.emplace(io::prepare_output_directory(directory, options.force, is_certificate_name));

@@ -1,4 +1,4 @@
-#include "apps/commands/run_signals.hpp"
+#include "apps/shared/signals.hpp"
 
 #include <atomic>
 #include <csignal>
