@@ -102,8 +102,9 @@ void draw_stress(Draws& draws, double p, bool leaning, StressLoad& stress) {
     for (std::size_t k = 3; k < 6; ++k) stress.to[k] = leaning ? p * draws.between(-0.25, 0.25) : 0;
 }
 
-/// Over the time of a step: pressed together faster the grains of a cell would soon touch their own images.
-constexpr double most_pressed = 0.02;
+/// Of an edge in a step: pressed together faster the grains of a cell, which is some three of the largest
+/// wide, would touch their own images before the twenty steps of a scene are over.
+constexpr double most_pressed = 0.01;
 
 /// One component strained or sheared at `rate` [1/s].
 void draw_rate(Draws& draws, double rate, Stage& stage) {

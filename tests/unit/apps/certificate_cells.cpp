@@ -281,5 +281,18 @@ end = { steps = 15 }
   EXPECT_GT(judged, 10);
 }
 
+TEST(CertificateCells, LeaveRoomForTheirGrainsHoweverTheyAreDriven) {
+  const auto room = [](std::uint64_t seed) {
+    const MadeScene made = make_scene("cell", seed, {});
+    Vec3 edges = made.scene.setup.domain.edges();
+    for (const Stage& stage : made.scene.setup.stages)
+      for (std::int64_t k = 0; k < stage.end.steps; ++k)
+        edges += stage.time_step * stage.strain_rates.cwiseProduct(edges);
+    return edges.minCoeff() / (2 * *std::ranges::max_element(made.grains.radius));
+  };
+  EXPECT_GT(room(40932), 2) << "pressed by a twentieth a step it was left with 1.96";
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) EXPECT_GT(room(seed), 2) << seed;
+}
+
 }  // namespace
 }  // namespace talus::audit

@@ -31,10 +31,11 @@ class StoppedStudy : public CommandTest {
               at("study").c_str(), nullptr);
       ::_exit(127);
     }
-    while (!fs::exists(at("study"))) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    ::kill(child, signal);
     int status = 0;
-    ::waitpid(child, &status, 0);
+    for (bool asked = false; ::waitpid(child, &status, WNOHANG) == 0;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      if (!asked && fs::exists(at("study"))) asked = ::kill(child, signal) == 0;
+    }
     return status;
   }
 };
