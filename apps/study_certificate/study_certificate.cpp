@@ -71,16 +71,17 @@ class Progress {
  private:
   static constexpr double every = 10;  ///< [s] between two lines
 
+  /// At once behind the first step, so that whoever waits knows that the study is under way.
   void say_where(const std::string& scene) {
-    if (seconds() < said_ + every) return;
+    if (said_ && seconds() < *said_ + every) return;
     said_ = seconds();
-    say(fmt::format("{} of {} scenes, {} steps, {:.0f} s; at {}", done_, scenes_, steps.size(), said_,
+    say(fmt::format("{} of {} scenes, {} steps, {:.0f} s; at {}", done_, scenes_, steps.size(), *said_,
                     scene));
   }
 
   std::size_t scenes_, done_ = 0;
   Clock::time_point start_ = Clock::now();
-  double said_ = 0;
+  std::optional<double> said_;  ///< [s] of the last line
 };
 
 /// Largest bounded error over the claim, of the scene's certified and judged steps.

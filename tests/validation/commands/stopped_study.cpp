@@ -20,7 +20,8 @@ using namespace test;
 
 class StoppedStudy : public CommandTest {
  protected:
-  /// The command with a signal as soon as it has its folder; exit status as waitpid gives it.
+  /// The command with a signal as soon as it has said that it is at a scene, which it says behind the first
+  /// step; exit status as waitpid gives it.
   int stopped(int signal) const {
     const pid_t child = ::fork();
     if (child == 0) {
@@ -34,7 +35,8 @@ class StoppedStudy : public CommandTest {
     int status = 0;
     for (bool asked = false; ::waitpid(child, &status, WNOHANG) == 0;) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      if (!asked && fs::exists(at("study"))) asked = ::kill(child, signal) == 0;
+      if (!asked && fs::exists(at("messages")) && content(at("messages")).find("; at ") != std::string::npos)
+        asked = ::kill(child, signal) == 0;
     }
     return status;
   }
