@@ -28,6 +28,52 @@ float along(const float (&n)[3], const SingleVelocity& body) {
   return n[0] * body.u[0] + n[1] * body.u[1] + n[2] * body.u[2];
 }
 
+/// A wall copy as the body that its contacts see.
+SingleVelocity as_body(const WallCopy& wall, double unit) {
+  SingleVelocity body;
+  for (std::size_t a = 0; a < 3; ++a) body.u[a] = static_cast<float>(wall.velocity[a]);
+  body.inv_mass = static_cast<float>(wall.inv_mass * unit);
+  return body;
+}
+
+void take_displacement(const SingleVelocity& body, WallCopy& wall) {
+  for (std::size_t a = 0; a < 3; ++a) wall.velocity[a] = static_cast<double>(body.u[a]);
+}
+
+/// Work [kg m^2] of the pushes of a chunk on the displacements of their bodies, and on their biases.
+struct PushWork {
+  double on_bodies = 0, on_biases = 0;
+};
+
+PushWork work_of(const Contacts& contacts, ContactRange range, const SingleState& single,
+                 const SingleVelocity* wall) {
+  const SingleContacts& c = single.contacts;
+  PushWork work;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    if (c.rn[k] == 0) continue;
+    const SingleVelocity& second = wall ? *wall : single.velocity[index(contacts.second[k])];
+    const float n[3] = {c.nx[k], c.ny[k], c.nz[k]};
+    const double push = static_cast<double>(c.rn[k]);
+    work.on_bodies +=
+        push * static_cast<double>(along(n, single.velocity[index(contacts.first[k])]) - along(n, second));
+    work.on_biases += push * static_cast<double>(c.bias[k]);
+  }
+  return work;
+}
+
+/// Multiplies the pushes of a chunk by `factor`, and moves their bodies by what that changes.
+void multiply_pushes(const Contacts& contacts, ContactRange range, float factor, SingleState& single,
+                     SingleVelocity* wall) {
+  SingleContacts& c = single.contacts;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    if (c.rn[k] == 0) continue;
+    const float n[3] = {c.nx[k], c.ny[k], c.nz[k]}, change = (factor - 1) * c.rn[k];
+    shift(change, n, single.velocity[index(contacts.first[k])]);
+    shift(-change, n, wall ? *wall : single.velocity[index(contacts.second[k])]);
+    c.rn[k] *= factor;
+  }
+}
+
 }  // namespace
 
 void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
@@ -68,22 +114,6 @@ void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t c
   }
 }
 
-namespace {
-
-/// A wall copy as the body that its contacts see.
-SingleVelocity as_body(const WallCopy& wall, double unit) {
-  SingleVelocity body;
-  for (std::size_t a = 0; a < 3; ++a) body.u[a] = static_cast<float>(wall.velocity[a]);
-  body.inv_mass = static_cast<float>(wall.inv_mass * unit);
-  return body;
-}
-
-void take_displacement(const SingleVelocity& body, WallCopy& wall) {
-  for (std::size_t a = 0; a < 3; ++a) wall.velocity[a] = static_cast<double>(body.u[a]);
-}
-
-}  // namespace
-
 void first_pushes(const Contacts& contacts, ContactRange range, std::span<const float> kept, double part,
                   SingleState& single, WallCopy* wall) {
   SingleContacts& c = single.contacts;
@@ -96,6 +126,20 @@ void first_pushes(const Contacts& contacts, ContactRange range, std::span<const 
     shift(c.rn[k], n, single.velocity[index(contacts.first[k])]);
     shift(-c.rn[k], n, wall ? at_wall : single.velocity[index(contacts.second[k])]);
   }
+  if (wall) take_displacement(at_wall, *wall);
+}
+
+void lower_pushes(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall) {
+  SingleVelocity at_wall = wall ? as_body(*wall, single.contacts.unit) : SingleVelocity{};
+  SingleVelocity* const second = wall ? &at_wall : nullptr;
+  const PushWork work = work_of(contacts, range, single, second);
+  const double excess = work.on_bodies + work.on_biases;
+  if (!(excess > 0)) return;
+  // A second look with half the pushes tells how much of the work they do on bodies that they move.
+  multiply_pushes(contacts, range, 0.5F, single, second);
+  const double own = 2 * work.on_bodies - 4 * work_of(contacts, range, single, second).on_bodies;
+  const double part = own > 0 ? std::max(0.0, 1 - excess / own) : 1;
+  multiply_pushes(contacts, range, static_cast<float>(2 * part), single, second);
   if (wall) take_displacement(at_wall, *wall);
 }
 

@@ -25,6 +25,7 @@ void PositionCorrection::run(std::size_t chunk, int epoch) {
     for (std::size_t k = range.begin; k < range.end; ++k) acceleration.steps.n[k] = 0;
     return first_pushes(state_.contacts, range, pushes_, part, single, copy);
   }
+  if (epoch == 1) lower_pushes(state_.contacts, range, single, copy);
   const double beta = momentum_beta(rule_.momentum, epoch - 1, rule_.momentum.most_without_friction);
   const SweepMomentum momentum{beta, rule_.momentum.over_relaxation, acceleration.steps};
   carry_velocities(kernels_, beta, work_.owned(chunk), single.velocity, single.last_v);

@@ -332,33 +332,6 @@ TEST(Simulation, WithoutFrictionHasNoTangentialArrays) {
   }
 }
 
-// ---- overlaps
-
-/// A free row, and one that stands at a wall: what opens its overlaps is no motion.
-TEST(OverlapCorrection, PartsGrainsAndGivesThemNoVelocity) {
-  for (const bool wall : {false, true})
-    for (const double mu : {0.0, 0.3}) {
-      talus::Setup setup;
-      if (wall) setup.walls = {box(1, 1, 1).front()};
-      Bodies row;
-      for (int k = 0; k < 10; ++k)
-        add_sphere(row, BodyId{k}, radius * Vec3(0.99 * (2 * k + 1), 0, 0), radius, density);
-      setup.stages = {stage("release", 20)};
-      setup.stages[0].laws.set_all(&PairLaw::friction, mu);
-      setup.solver.overlap_correction = 0.5;
-      graph::Executor executor({.threads = 1});
-      Simulation simulation(setup, row, executor);
-      for (int k = 0; k < 20; ++k) {
-        const StepReport& report = simulation.step();
-        EXPECT_TRUE(report.converged);
-        EXPECT_EQ(report.kinetic_translation + report.kinetic_rotation, 0);
-        for (const double r : simulation.state().candidates.impulse.values()) EXPECT_EQ(r, 0);
-      }
-      const double at_first = 0.02;  // of a radius
-      EXPECT_LT(simulation.report().penetration_max, 0.02 * at_first) << "wall " << wall << ", mu " << mu;
-    }
-}
-
 /// Speeds that differ by their last bit cannot be made equal: no impulse is small enough.
 TEST(Simulation, RoundingIsNoErrorOfASolver) {
   talus::Setup setup;

@@ -1,0 +1,72 @@
+/// Overlaps that a step undoes behind its velocities.
+
+#include "runtime/step/position_correction.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "runtime/graph/one_rank.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/runtime/step/loose_scenes.hpp"
+
+namespace talus::position_correction_test {
+namespace {
+
+using namespace simulation_test;
+
+/// A free row, and one that stands at a wall: what opens its overlaps is no motion.
+TEST(PositionCorrection, PartsGrainsAndGivesThemNoVelocity) {
+  for (const bool wall : {false, true})
+    for (const double mu : {0.0, 0.3}) {
+      talus::Setup setup;
+      if (wall) setup.walls = {box(1, 1, 1).front()};
+      Bodies row;
+      for (int k = 0; k < 10; ++k)
+        add_sphere(row, BodyId{k}, radius * Vec3(0.99 * (2 * k + 1), 0, 0), radius, density);
+      setup.stages = {stage("release", 20)};
+      setup.stages[0].laws.set_all(&PairLaw::friction, mu);
+      setup.solver.overlap_correction = 0.5;
+      graph::Executor executor({.threads = 1});
+      Simulation simulation(setup, row, executor);
+      for (int k = 0; k < 20; ++k) {
+        const StepReport& report = simulation.step();
+        EXPECT_TRUE(report.converged);
+        EXPECT_EQ(report.kinetic_translation + report.kinetic_rotation, 0);
+        for (const double r : simulation.state().candidates.impulse.values()) EXPECT_EQ(r, 0);
+      }
+      const double at_first = 0.02;  // of a radius
+      EXPECT_LT(simulation.report().penetration_max, 0.02 * at_first) << "wall " << wall << ", mu " << mu;
+    }
+}
+
+/// A grain leaves the row that it overlaps. Its overlap has pushed the whole row a little, step by step; the
+/// row would go on by these pushes for many steps, as ten sweeps hardly take them away.
+TEST(PositionCorrection, StopsPushingARowWhenAnOverlapHasOpenedByItself) {
+  constexpr int count = 30;
+  constexpr double deep = 0.01 * radius, part = 0.01;
+  talus::Setup setup;
+  setup.stages = {stage("leave", 20)};
+  setup.solver.overlap_correction = part;
+  Bodies row;
+  add_sphere(row, BodyId{0}, Vec3(-deep, 0, 0), radius, density);
+  for (int k = 1; k < count; ++k) add_sphere(row, BodyId{k}, Vec3(-2 * radius * k, 0, 0), radius, density);
+  row.velocity[0].u[0] = deep / (9.5 * setup.stages[0].time_step);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, row, executor);
+  std::vector<double> moved;  // by each step, of what has moved farthest but the one that leaves
+  for (int step = 1; step <= 14; ++step) {
+    const Frame before = simulation.frame(false), after = (simulation.step(), simulation.frame(false));
+    moved.push_back(0);
+    for (std::size_t k = 1; k < before.x.size(); ++k)
+      moved.back() = std::max(moved.back(), (after.x[k] - before.x[k]).norm());
+  }
+  EXPECT_GT(moved[0], 0.1 * part * deep);
+  for (std::size_t step = 10; step < moved.size(); ++step)
+    EXPECT_LT(moved[step], 0.04 * moved[0]) << "step " << step + 1;
+}
+
+}  // namespace
+}  // namespace talus::position_correction_test
