@@ -170,6 +170,9 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   // The same for files beyond a limit: else the system ends a run that says "running" for ever.
   std::signal(SIGXFSZ, SIG_IGN);
+  // It asks a run for a checkpoint, and goes to all processes of a job: it ends none that has nothing to
+  // save.
+  std::signal(SIGUSR1, SIG_IGN);
   CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
   app.set_version_flag("--version", version_text());
   app.require_subcommand(1);

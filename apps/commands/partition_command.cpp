@@ -16,6 +16,7 @@
 #include "io/pictures/picture.hpp"
 #include "io/results/vtk.hpp"
 #include "io/scene/scene.hpp"
+#include "io/scene/scene_change.hpp"
 #include "kernels/detection/images.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "partition/interface.hpp"
@@ -179,7 +180,8 @@ int partition_command(const PartitionCommandOptions& options) {
     append(sample, bodies);
     if (directory.empty()) directory = "out/partition-" + scene.name;
     check_boxes(scene.setup.decomposition, options.subdomains, kinds);
-    lock.emplace(io::prepare_output_directory(directory, options.force, is_partition_name));
+    lock.emplace(
+        io::prepare_output_directory(directory, options.force, is_partition_name, io::files_read(scene)));
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

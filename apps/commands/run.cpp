@@ -36,6 +36,7 @@
 #include "io/output/sinks.hpp"
 #include "io/results/run_json.hpp"
 #include "io/scene/scene.hpp"
+#include "io/scene/scene_change.hpp"
 #include "io/trace/trace_file.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/simulation.hpp"
@@ -233,7 +234,8 @@ bool take_directory(const RunOptions& options, const graph::Communicator& ranks,
     try {
       run.lock.reset();
       run.lock.emplace(io::prepare_output_directory(run.directory, options.force || options.resume,
-                                                    io::is_output_name, resolved_text));
+                                                    io::is_output_name, io::files_read(run.scene),
+                                                    resolved_text));
     } catch (const io::FileError& error) {
       refused = error.what();
     }
@@ -323,13 +325,26 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
   return summary.exit_code;
 }
 
+/// Collective. A signal has asked to stop before anything was written.
+bool stopped_before_its_first_step(const graph::Communicator& ranks) {
+  double signal[1] = {static_cast<double>(stop_signal())};
+  ranks.max(signal);
+  if (signal[0] > 0 && ranks.rank() == 0)
+    print_error("talus: stopped: {} before the first step; nothing was written\n",
+                signal_name(static_cast<int>(signal[0])));
+  return signal[0] > 0;
+}
+
 }  // namespace
 
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   const double began = graph::seconds_now();
   Terminal terminal(options.quiet);
   Prepared run;
-  if (!prepare(options, ranks, terminal, run)) return exit_bad_input;
+  catch_signals();
+  const bool prepared = prepare(options, ranks, terminal, run);
+  if (stopped_before_its_first_step(ranks)) return exit_stopped;
+  if (!prepared) return exit_bad_input;
   if (options.dry_run) return exit_done;
   if (run.nothing_left) {
     if (ranks.rank() == 0 && run.enough)
@@ -348,7 +363,6 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     return *run.nothing_left;
   }
   share_walls(run.scene.setup, ranks);
-  catch_signals();
   try {
     return run_scene(options, ranks, terminal, std::move(run), began);
   } catch (const std::exception& error) {

@@ -23,12 +23,12 @@ namespace talus {
 namespace {
 
 std::atomic<pid_t> running{0};
-std::atomic<int> stop_signal{0};
+std::atomic<int> passed_on{0};
 static_assert(std::atomic<pid_t>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
 /// What a process sends is for this one alone, so it is passed on; a terminal interrupts the child too.
 extern "C" void stop_child(int signal, siginfo_t* info, void*) {
-  stop_signal.store(signal);
+  passed_on.store(signal);
   if (const pid_t child = running.load(); child > 0 && info->si_code <= 0) ::kill(child, signal);
 }
 
@@ -36,7 +36,7 @@ extern "C" void stop_child(int signal, siginfo_t* info, void*) {
 class Attendance {
  public:
   Attendance() {
-    stop_signal.store(0);
+    passed_on.store(0);
     struct sigaction action {};
     action.sa_sigaction = stop_child;
     action.sa_flags = SA_SIGINFO;
@@ -53,7 +53,7 @@ class Attendance {
   /// One that came before there was a child is passed on too, whoever sent it.
   void of(pid_t child) {
     running.store(child);
-    if (const int signal = stop_signal.load(); signal != 0) ::kill(child, signal);
+    if (const int signal = passed_on.load(); signal != 0) ::kill(child, signal);
   }
 
  private:
@@ -82,7 +82,7 @@ int run_child(const std::vector<std::string>& words, const std::filesystem::path
   while (::waitpid(child, &status, 0) < 0)
     if (errno != EINTR)
       throw std::runtime_error(fmt::format("cannot wait for {}: {}", words.front(), std::strerror(errno)));
-  if (const int signal = stop_signal.load(); signal != 0)
+  if (const int signal = passed_on.load(); signal != 0)
     throw std::runtime_error(
         fmt::format("stopped by signal {} ({}) while {} ran", signal, ::strsignal(signal), words.front()));
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

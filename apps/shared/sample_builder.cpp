@@ -11,6 +11,7 @@
 
 #include "apps/shared/patience.hpp"
 #include "apps/shared/sample_join.hpp"
+#include "apps/shared/signals.hpp"
 #include "apps/shared/state_sample.hpp"
 #include "io/scene/bodies_file.hpp"
 #include "kernels/detection/images.hpp"
@@ -60,6 +61,9 @@ std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double
   } else {
     Patience patience;
     places = deposit(radii, spec.base[0], spec.base[1], [&](std::size_t placed) {
+      if (stop_signal() != 0)
+        throw std::runtime_error(fmt::format("{} came as grain {} of {} was deposited",
+                                             signal_name(stop_signal()), placed, radii.size()));
       patience.tell([&] { return fmt::format("{} of {} grains deposited", placed, radii.size()); });
     });
   }

@@ -12,7 +12,7 @@ namespace talus {
 /// 0, 1, ..., but those of a file or a state, behind which the others go on. `state`: what read_state gave,
 /// where it is at hand. Throws io::SceneError when a file is missing or damaged, when a grain has no mass or
 /// speed that is finite, or samples overlap one another, std::invalid_argument when grains do not fit their
-/// base.
+/// base, std::runtime_error when a signal asks to stop (signals.hpp).
 Sample build_sample(const io::Scene& scene, std::optional<Sample> state = std::nullopt);
 
 /// Where materials have names: gives the grains that have none that of a sample of the scene, and all their

@@ -22,6 +22,7 @@
 #include "apps/study_certificate/scene_maker.hpp"
 #include "apps/study_certificate/step_problem.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/scene/scene_change.hpp"
 
 namespace talus {
 
@@ -249,7 +250,12 @@ int study_certificate_command(const StudyCertificateOptions& options) {
   catch_signals();
   try {
     if (!options.scenes_from.empty()) given = given_scenes(options);
-    lock.emplace(io::prepare_output_directory(directory, options.force, is_certificate_name));
+    std::vector<std::string> inputs;
+    for (const io::Scene& scene : given) {
+      inputs.push_back(scene.source_file);
+      for (std::string& file : io::files_read(scene)) inputs.push_back(std::move(file));
+    }
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_certificate_name, inputs));
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

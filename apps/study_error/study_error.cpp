@@ -23,6 +23,7 @@
 #include "apps/study_error/study_variants.hpp"
 #include "io/fclib/fclib.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/scene/scene_change.hpp"
 #include "runtime/step/methods/method.hpp"
 
 namespace talus {
@@ -95,7 +96,8 @@ int study_scene(const StudyErrorOptions& options) {
       if (samples.empty() || samples.back().scene.setup.seed != variant.seed)
         samples.push_back(study_sample(options.subject, options.overrides, variant.seed));
     if (directory.empty()) directory = "out/error-" + scene.name;
-    lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name));
+    lock.emplace(
+        io::prepare_output_directory(directory, options.force, is_study_error_name, io::files_read(scene)));
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

@@ -25,6 +25,7 @@
 #include "apps/study_scaling/scaling_scenes.hpp"
 #include "apps/study_scaling/scaling_study.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/scene/scene_change.hpp"
 
 namespace talus {
 
@@ -148,10 +149,12 @@ void prepare(const StudyScalingOptions& options, PreparedStudy& study) {
   if (study.no_weak.empty() && !study.plan.weak.empty()) demand_weak_sample(options, study.plan.weak);
   const std::string directory = options.out.empty() ? "out/scaling-" + sample.scene.name : options.out;
   if (options.reuse) study.recordings = read_recordings(fs::path(directory) / "traces" / "times.csv");
+  std::vector<std::string> inputs = io::files_read(scene);
+  inputs.push_back(options.scene);
   write_strong(sample, directory, options.reuse, [&] {
     study.lock.emplace(
         io::prepare_output_directory(directory, options.force || options.reuse,
-                                     options.reuse ? is_name_but_recorded : is_study_scaling_name));
+                                     options.reuse ? is_name_but_recorded : is_study_scaling_name, inputs));
   });
   study.directory = fs::absolute(directory).lexically_normal().string();
 }

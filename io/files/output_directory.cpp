@@ -36,6 +36,18 @@ fs::path link_in_the_way(const fs::path& directory, IsOutputName is_ours) {
   return {};
 }
 
+/// A name of the same file as one of the inputs would go with it.
+void demand_no_input(const fs::path& directory, const std::vector<fs::path>& former,
+                     const std::vector<std::string>& inputs) {
+  std::error_code unknown;
+  for (const fs::path& relative : former)
+    for (const std::string& input : inputs)
+      if (fs::equivalent(directory / relative, input, unknown))
+        throw FileError((directory / relative).string(),
+                        "is read by what would be written here, and --force would remove it; choose another "
+                        "directory with --out");
+}
+
 }  // namespace
 
 std::string whole_name(std::string name) {
@@ -82,7 +94,7 @@ std::vector<fs::path> outputs_in(const fs::path& directory, IsOutputName is_ours
 }
 
 DirectoryLock prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours,
-                                       const fs::path& last) {
+                                       const std::vector<std::string>& inputs, const fs::path& last) {
   try {
     if (fs::exists(directory) && !fs::is_directory(directory)) {
       throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
@@ -105,6 +117,7 @@ DirectoryLock prepare_output_directory(const fs::path& directory, bool force, Is
                         "is a symbolic link, and results would be written where it leads; remove it, or "
                         "choose another directory with --out");
       std::vector<fs::path> former = outputs_in(directory, is_ours);
+      demand_no_input(directory, former, inputs);
       std::stable_partition(former.begin(), former.end(),
                             [&](const fs::path& relative) { return relative != last; });
       for (const fs::path& relative : former) fs::remove(directory / relative);

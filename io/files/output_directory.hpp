@@ -46,12 +46,14 @@ std::vector<std::filesystem::path> outputs_in(const std::filesystem::path& direc
 /// Makes `directory` (and its parents) ready for a run, which holds the lock until it has written all. An
 /// existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
 /// only files that `is_ours` knows are removed, and their unfinished forms, which end in ".part", among them
-/// `last` behind the others, as it says whose they are; whatever else the user keeps there stays. Throws
-/// FileError naming the link when a symbolic link stands in the place of results, which would be written
-/// where it leads; naming the directory when it is refused, when another run is writing there, or when it is
-/// not a directory, or cannot be created or written to.
+/// `last` behind the others, as it says whose they are; whatever else the user keeps there stays. Nothing is
+/// removed where one of them is among the `inputs`, which are still to be read. Throws FileError naming that
+/// file; naming the link when a symbolic link stands in the place of results, which would be written where it
+/// leads; naming the directory when it is refused, when another run is writing there, or when it is not a
+/// directory, or cannot be created or written to.
 [[nodiscard]] DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
                                                      IsOutputName is_ours,
+                                                     const std::vector<std::string>& inputs = {},
                                                      const std::filesystem::path& last = {});
 
 /// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.

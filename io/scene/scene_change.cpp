@@ -133,4 +133,11 @@ std::vector<std::string> input_files(const Scene& scene) {
   return files;
 }
 
+std::vector<std::string> files_read(const Scene& scene) {
+  std::vector<std::string> files = input_files(scene);
+  for (const SampleSpec& sample : scene.samples)
+    if (sample.kind == SampleSpec::Kind::state) files.push_back(sample.file);
+  return files;
+}
+
 }  // namespace talus::io

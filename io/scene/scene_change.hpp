@@ -29,5 +29,7 @@ std::string describe(const SceneChange& change);
 /// Absolute paths of the files that a scene reads, but for the state that its sample was: that is as large as
 /// a checkpoint itself, and not needed any more.
 std::vector<std::string> input_files(const Scene& scene);
+/// The same, and that state.
+std::vector<std::string> files_read(const Scene& scene);
 
 }  // namespace talus::io

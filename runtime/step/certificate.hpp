@@ -182,6 +182,8 @@ class Certificate {
   explicit Certificate(const SolverSettings& settings, const CertificateThresholds& thresholds = {})
       : settings_(settings), thresholds_(thresholds) {}
 
+  explicit Certificate(SolverSettings&&, const CertificateThresholds& = {}) = delete;
+
   void begin(Scales scales);
   Verdict judge(const CheckSums& sums, const Check& check, WholeProblem& whole);
   /// Whether the forces that walls and heavy bodies get are right within balance_tolerance: by the drift of
@@ -265,6 +267,7 @@ class Certificate {
   bool even(WholeProblem& whole);
   double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
+  double claimed(double error, WholeProblem& whole);
   bool large_ask_for_more(WholeProblem& whole);
   double drifting(WholeProblem& whole);
   /// Relative error of velocities by the work of the contacts' errors.
