@@ -146,6 +146,8 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
     terminal.say("remove '{}': {}{}, {:.6g} kg", remove.name,
                  counted(static_cast<std::size_t>(remove.count), "grain"),
                  remove.material.empty() ? "" : fmt::format(" of '{}'", remove.material), remove.mass);
+  if (!simulation.removed().empty() && simulation.bodies() == 0)
+    terminal.warn("warning: no grain is left at the end");
 }
 
 }  // namespace

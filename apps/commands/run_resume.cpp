@@ -127,6 +127,11 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
       refused.push_back(file + " has changed");
   }
   if (refused.empty()) return;
+  constexpr std::size_t most_named = 8;
+  if (const std::size_t all = refused.size(); all > most_named) {
+    refused.resize(most_named);
+    refused.push_back(fmt::format("and {} more", all - most_named));
+  }
   throw std::invalid_argument(fmt::format(
       "the checkpoint {} is of another scene: {}. Ends of stages, loads of walls, output and checkpoints "
       "may change; for anything else, stresses of a cell among it, begin a run in another directory, from "

@@ -36,6 +36,8 @@ double load_of(const StepOutcome& outcome) {
 /// and against the mean: a sample that drifts or is sheared evenly is none the less at rest.
 double distance_from_equilibrium(const StepOutcome& outcome, const std::optional<Mat3>& against_flow) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
+  // Where no grain is left there is nothing to rest.
+  if (!(sample.total_mass > 0)) return std::numeric_limits<double>::infinity();
   const double h = parameters.impulse_time(), load = load_of(outcome);
   double net = 0;
   for (std::size_t w = 0; w < state.walls.size(); ++w) {

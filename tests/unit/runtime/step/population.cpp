@@ -46,6 +46,23 @@ TEST(Population, NumberAndMassAreKept) {
   EXPECT_GT(simulation.bodies(), 100);
 }
 
+// A stage that was to end when its grains rest ended as the last one was taken away.
+TEST(Population, ThatIsGoneIsInNoEquilibrium) {
+  talus::Setup setup = floor_setup(20);
+  setup.stages[0].end.equilibrium = 1e-3;
+  setup.stages[0].end.equilibrium_hold = 0;
+  setup.removes = {removal(below(1))};
+  setup.removes.front().at = {0.01};
+  Bodies bodies;
+  add_sphere(bodies, BodyId{0}, {0, 0, 0.5}, 0.005, density);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, std::move(bodies), executor);
+  while (simulation.stage_fraction() < 1) simulation.step();
+  EXPECT_EQ(simulation.bodies(), 0);
+  EXPECT_STREQ(simulation.end_reached(), "steps");
+  EXPECT_EQ(simulation.report().step, 20);
+}
+
 TEST(Population, ARateOfMassIsKeptToAGrain) {
   talus::Setup setup = floor_setup(300);
   setup.inserts.push_back(rain(0));
