@@ -227,6 +227,13 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
   return agreed([&] { check_threads(options, ranks, run.threads); });
 }
 
+std::vector<std::string> files_read(const RunOptions& options, const io::Scene& scene) {
+  std::vector<std::string> files = io::files_read(scene);
+  for (const std::string& trace : {options.replay_order, options.task_times})
+    if (!trace.empty()) files.push_back(trace);
+  return files;
+}
+
 /// The results are those of a run from here on: a directory of its own, or the one that it goes on in.
 bool take_directory(const RunOptions& options, const graph::Communicator& ranks, Prepared& run) {
   std::string refused;
@@ -234,7 +241,7 @@ bool take_directory(const RunOptions& options, const graph::Communicator& ranks,
     try {
       run.lock.reset();
       run.lock.emplace(io::prepare_output_directory(run.directory, options.force || options.resume,
-                                                    io::is_output_name, io::files_read(run.scene),
+                                                    io::is_output_name, files_read(options, run.scene),
                                                     resolved_text));
     } catch (const io::FileError& error) {
       refused = error.what();
@@ -325,13 +332,13 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
   return summary.exit_code;
 }
 
-/// Collective. A signal has asked to stop before anything was written.
-bool stopped_before_its_first_step(const graph::Communicator& ranks) {
+/// Collective. A signal has asked to stop before any step.
+bool stopped_before_a_step(const graph::Communicator& ranks, bool goes_on) {
   double signal[1] = {static_cast<double>(stop_signal())};
   ranks.max(signal);
   if (signal[0] > 0 && ranks.rank() == 0)
-    print_error("talus: stopped: {} before the first step; nothing was written\n",
-                signal_name(static_cast<int>(signal[0])));
+    print_error("talus: stopped: {} before {}\n", signal_name(static_cast<int>(signal[0])),
+                goes_on ? "the run went on" : "the first step; nothing was written");
   return signal[0] > 0;
 }
 
@@ -343,7 +350,8 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   Prepared run;
   catch_signals();
   const bool prepared = prepare(options, ranks, terminal, run);
-  if (stopped_before_its_first_step(ranks)) return exit_stopped;
+  const bool has_steps = !prepared || !(options.dry_run || run.nothing_left);
+  if (has_steps && stopped_before_a_step(ranks, run.point.has_value())) return exit_stopped;
   if (!prepared) return exit_bad_input;
   if (options.dry_run) return exit_done;
   if (run.nothing_left) {

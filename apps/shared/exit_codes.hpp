@@ -9,7 +9,8 @@ enum ExitCode : int {
                               ///< written, a dump that was asked for and not made
   exit_bad_input = 2,         ///< scene, option or input file; nothing was written
   exit_tolerance_missed = 3,  ///< finished, but a step or problem is over its tolerance
-  exit_stopped = 75,  ///< stopped by a signal or a limit, behind a checkpoint: --resume goes on from there.
+  exit_stopped = 75,  ///< stopped by a signal or a limit, behind a checkpoint: --resume goes on from there;
+                      ///< or before the first step, with nothing written.
                       ///< EX_TEMPFAIL of sysexits.h: "the user is invited to retry"
 };
 

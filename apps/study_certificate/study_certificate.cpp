@@ -165,8 +165,17 @@ std::vector<io::Scene> given_scenes(const StudyCertificateOptions& options) {
 void audit_given(const StudyCertificateOptions& options, const std::vector<io::Scene>& scenes,
                  Progress& progress) {
   const AuditPlan plan{options.steps > 0 ? options.steps : std::numeric_limits<std::int64_t>::max(), {}};
-  for (const io::Scene& scene : scenes)
-    if (stop_signal() == 0) progress.audit(scene, scene.name, build_sample(scene), plan);
+  for (const io::Scene& scene : scenes) {
+    if (stop_signal() != 0) return;
+    Sample grains;
+    try {
+      grains = build_sample(scene);
+    } catch (const std::exception&) {
+      if (stop_signal() != 0) return;  // which cuts a deposition short
+      throw;
+    }
+    progress.audit(scene, scene.name, grains, plan);
+  }
 }
 
 std::string summary_of(const Progress& progress, std::size_t scenes) {

@@ -147,7 +147,7 @@ int study_folder(const StudyErrorOptions& options) {
     const std::string name = fs::absolute(folder / "x").lexically_normal().parent_path().filename().string();
     if (directory.empty()) directory = "out/error-" + name;
     check_profile(folder, methods);
-    lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name));
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name, {}));
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

@@ -174,7 +174,7 @@ int stability_command(const StabilityOptions& options) {
       for (const Scene& scene : scenes) print_out("{:<33} {}\n", scene.name, scene.asks);
       return exit_done;
     }
-    lock.emplace(io::prepare_output_directory(directory, options.force, is_stability_name));
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_stability_name, {}));
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

@@ -112,7 +112,7 @@ int validate_command(const ValidateOptions& options) {
       for (const Case& one : some) print_out("{:<16} {}\n", one.name, one.sentence);
       return exit_done;
     }
-    lock.emplace(io::prepare_output_directory(directory, options.force, is_validation_name));
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_validation_name, {}));
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

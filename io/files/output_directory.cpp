@@ -44,7 +44,7 @@ void demand_no_input(const fs::path& directory, const std::vector<fs::path>& for
     for (const std::string& input : inputs)
       if (fs::equivalent(directory / relative, input, unknown))
         throw FileError((directory / relative).string(),
-                        "is read by what would be written here, and --force would remove it; choose another "
+                        "is still to be read, and would be removed with the former results; choose another "
                         "directory with --out");
 }
 

@@ -97,7 +97,7 @@ constexpr Column<StepReport> steps_columns[] = {
      [](std::string& t, const auto& r) { put(t, r.kinetic_rotation); }},
     {"solid_fraction", "1", "volume of grains over that of the box; 0 where walls close none",
      [](std::string& t, const auto& r) { put(t, r.solid_fraction); }},
-    {"equilibrium", "1", "distance from equilibrium; inf without a load",
+    {"equilibrium", "1", "distance from equilibrium; inf where grains without a load move, or none is left",
      [](std::string& t, const auto& r) { put(t, r.equilibrium); }},
     {"migrants", "1", "bodies new in a subdomain", [](std::string& t, const auto& r) { put(t, r.migrants); }},
     {"imbalance", "1", "largest over mean work of the subdomains",

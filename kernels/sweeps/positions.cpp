@@ -40,7 +40,8 @@ void take_displacement(const SingleVelocity& body, WallCopy& wall) {
   for (std::size_t a = 0; a < 3; ++a) wall.velocity[a] = static_cast<double>(body.u[a]);
 }
 
-/// Work [kg m^2] of the pushes of a chunk on the displacements of their bodies, and on their biases.
+/// Work [unit of mass, m^2] of the pushes of a chunk on the displacements of their bodies, and on their
+/// biases.
 struct PushWork {
   double on_bodies = 0, on_biases = 0;
 };
@@ -138,6 +139,7 @@ void lower_pushes(const Contacts& contacts, ContactRange range, SingleState& sin
   // A second look with half the pushes tells how much of the work they do on bodies that they move.
   multiply_pushes(contacts, range, 0.5F, single, second);
   const double own = 2 * work.on_bodies - 4 * work_of(contacts, range, single, second).on_bodies;
+  // Bodies that cannot be moved have pushes that do nothing: those stay.
   const double part = own > 0 ? std::max(0.0, 1 - excess / own) : 1;
   multiply_pushes(contacts, range, static_cast<float>(2 * part), single, second);
   if (wall) take_displacement(at_wall, *wall);

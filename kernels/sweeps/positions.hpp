@@ -39,10 +39,11 @@ void first_pushes(const Contacts& contacts, ContactRange range, std::span<const 
 void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const SingleState& single,
                  std::span<float> kept);
 
-/// Takes a common part off the pushes of a chunk, once those of all chunks are applied, where they push more
-/// than their overlaps ask for: the least of 1/2 d.M d + p.b over s >= 0, the pushes p of the chunk being s
-/// times what they are. Pushes that a row of bodies begins from would outlive by many steps an overlap that
-/// has opened by itself, as so few sweeps take them away no faster than they travel along the row.
+/// Takes a common part off the pushes of a chunk, once those of all chunks are applied, where as a whole they
+/// push more than their overlaps ask for: the least of 1/2 d.M d + p.b over s >= 0, the pushes p of the chunk
+/// being s times what they are. Pushes that a row of bodies begins from would outlive by many steps an
+/// overlap that has opened by itself, as so few sweeps take them away no faster than they travel along the
+/// row.
 void lower_pushes(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall);
 
 /// One sweep with momentum over a chunk of blocks, which has no groups that could be swept at once;

@@ -181,7 +181,7 @@ class Certificate {
   /// `settings` is kept as a reference.
   explicit Certificate(const SolverSettings& settings, const CertificateThresholds& thresholds = {})
       : settings_(settings), thresholds_(thresholds) {}
-
+  /// Settings that end with the statement would be asked later.
   explicit Certificate(SolverSettings&&, const CertificateThresholds& = {}) = delete;
 
   void begin(Scales scales);

@@ -223,5 +223,20 @@ TEST_F(Ending, OfOneStepOfLmgc90IsThatOfLmgc90) {
   EXPECT_EQ(pushed, 3U);
 }
 
+// A run whose state lay among the results that it replaces ended well, and could not be repeated.
+TEST_F(Ending, ForceLeavesTheStateThatTheSceneBeginsFrom) {
+  write(at("scene.toml"), column_scene);
+  ASSERT_EQ(run("run scene.toml --out results").code, 0);
+  write(at("on.toml"),
+        "time_step = 1e-3\n[material]\ndensity = 2600\n[sample]\nkind = \"state\"\nfile = "
+        "\"results/results.h5\"\n[[wall]]\nname = \"z-\"\n[[stage]]\nend = { steps = 1 }\n");
+  const auto before = files_below(at("results"));
+  const Outcome refused = run("run on.toml --out results --force");
+  EXPECT_EQ(refused.code, 2) << refused.messages;
+  EXPECT_NE(refused.messages.find("results.h5: is still to be read"), std::string::npos) << refused.messages;
+  EXPECT_EQ(files_below(at("results")), before);
+  EXPECT_EQ(run("run on.toml --out elsewhere --force").code, 0);
+}
+
 }  // namespace
 }  // namespace talus::command_endings_test

@@ -4,7 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
 
 #include "io/files/error.hpp"
 #include "io/output/sinks.hpp"
@@ -22,7 +26,7 @@ void touch(const fs::path& path) {
 
 /// For a run that ends at once.
 void prepare(const std::filesystem::path& directory, bool force) {
-  const DirectoryLock lock = prepare_output_directory(directory, force, is_output_name);
+  const DirectoryLock lock = prepare_output_directory(directory, force, is_output_name, {});
 }
 
 TEST(OutputDirectory, IsCreatedWithItsParents) {
@@ -121,7 +125,7 @@ TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
 TEST(OutputDirectory, IsRefusedAsLongAsAnotherRunWritesThere) {
   const ScratchDirectory scratch;
   {
-    const DirectoryLock lock = prepare_output_directory(scratch / "run", false, is_output_name);
+    const DirectoryLock lock = prepare_output_directory(scratch / "run", false, is_output_name, {});
     touch(scratch / "run/steps.csv");
     for (const bool force : {false, true}) {
       const std::string message = message_of<FileError>([&] { prepare(scratch / "run", force); });

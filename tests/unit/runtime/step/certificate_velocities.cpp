@@ -127,20 +127,23 @@ TEST(Certificate, BoundsVelocitiesMoreLooselyWithFrictionOrAsTheUserSays) {
 // A bed on a belt was certified with a fifth of its momentum wrong for a claim of 0.036: a check of
 // velocities knows little of contacts that slide, and 0.3 of the work was all that was believed.
 TEST(Certificate, ClaimsTwiceTheWorkWithFrictionAsFarAsItsToleranceGoes) {
-  const auto claimed = [](double work, bool friction) {
-    const SolverSettings settings{.balance_tolerance = 0.05};
+  const auto claimed = [](double work, bool friction, Verdict expected = Verdict::solved,
+                          double velocity_tolerance = 0) {
+    const SolverSettings settings{.balance_tolerance = 0.05, .velocity_tolerance = velocity_tolerance};
     Certificate certificate(settings);
     certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}, .friction = friction});
     KnownProblem problem(1, {0.01});
     certificate.judge(sums_of({0, 1}, 1000), {.iterations = 0}, problem);
     const Verdict verdict =
         certificate.judge(sums_of({10, 1e-4, 1, work}, 1000), {.iterations = 10}, problem);
-    EXPECT_EQ(verdict, Verdict::solved) << work;
+    EXPECT_EQ(verdict, expected) << work;
     return certificate.result().velocity_error;
   };
   EXPECT_DOUBLE_EQ(claimed(0.12, true), 0.24);
   EXPECT_DOUBLE_EQ(claimed(0.9, true), 0.5) << "no step is missed for it";
   EXPECT_DOUBLE_EQ(claimed(0.12, false), 0.012) << "the check knows";
+  EXPECT_DOUBLE_EQ(claimed(0.3, true, Verdict::go_on, 0.1), 0.6) << "a bound of the user's is kept";
+  EXPECT_DOUBLE_EQ(claimed(0.04, true, Verdict::solved, 0.1), 0.08);
 }
 
 }  // namespace
