@@ -130,17 +130,18 @@ void first_pushes(const Contacts& contacts, ContactRange range, std::span<const 
   if (wall) take_displacement(at_wall, *wall);
 }
 
-void lower_pushes(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall) {
+void lower_pushes(const Contacts& contacts, ContactRange range, double excess, SingleState& single,
+                  WallCopy* wall) {
   SingleVelocity at_wall = wall ? as_body(*wall, single.contacts.unit) : SingleVelocity{};
   SingleVelocity* const second = wall ? &at_wall : nullptr;
   const PushWork work = work_of(contacts, range, single, second);
-  const double excess = work.on_bodies + work.on_biases;
-  if (!(excess > 0)) return;
+  const double slope = work.on_bodies + work.on_biases;
+  if (!(slope > excess * work.on_bodies && work.on_bodies > 0)) return;
   // A second look with half the pushes tells how much of the work they do on bodies that they move.
   multiply_pushes(contacts, range, 0.5F, single, second);
   const double own = 2 * work.on_bodies - 4 * work_of(contacts, range, single, second).on_bodies;
   // Bodies that cannot be moved have pushes that do nothing: those stay.
-  const double part = own > 0 ? std::max(0.0, 1 - excess / own) : 1;
+  const double part = own > 0 ? std::max(0.0, 1 - slope / own) : 1;
   multiply_pushes(contacts, range, static_cast<float>(2 * part), single, second);
   if (wall) take_displacement(at_wall, *wall);
 }

@@ -40,11 +40,12 @@ void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chu
                  std::span<float> kept);
 
 /// Takes a common part off the pushes of a chunk, once those of all chunks are applied, where as a whole they
-/// push more than their overlaps ask for: the least of 1/2 d.M d + p.b over s >= 0, the pushes p of the chunk
-/// being s times what they are. Pushes that a row of bodies begins from would outlive by many steps an
-/// overlap that has opened by itself, as so few sweeps take them away no faster than they travel along the
-/// row.
-void lower_pushes(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall);
+/// push more than their overlaps ask for, by more than `excess` in (0, 1) of their work: the least of 1/2 d.M
+/// d + p.b over s >= 0, the pushes p of the chunk being s times what they are. Pushes that a row of bodies
+/// begins from would outlive by many steps an overlap that has opened by itself, as so few sweeps take them
+/// away no faster than they travel along the row.
+void lower_pushes(const Contacts& contacts, ContactRange range, double excess, SingleState& single,
+                  WallCopy* wall);
 
 /// One sweep with momentum over a chunk of blocks, which has no groups that could be swept at once;
 /// SweepKernels sweeps the others. `wall` is null between bodies.

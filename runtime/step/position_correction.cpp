@@ -26,7 +26,7 @@ void PositionCorrection::run(std::size_t chunk, int epoch) {
     return first_pushes(state_.contacts, range, pushes_, part, single, copy);
   }
   // Momentum begins epochs later, and knows nothing of it.
-  if (epoch == 1) lower_pushes(state_.contacts, range, single, copy);
+  if (epoch == 1) lower_pushes(state_.contacts, range, rule_.excess, single, copy);
   const double beta = momentum_beta(rule_.momentum, epoch - 1, rule_.momentum.most_without_friction);
   const SweepMomentum momentum{beta, rule_.momentum.over_relaxation, acceleration.steps};
   carry_velocities(kernels_, beta, work_.owned(chunk), single.velocity, single.last_v);

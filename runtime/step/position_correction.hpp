@@ -17,6 +17,9 @@ struct PositionCorrectionRule {
   /// Sweeps per step, >= 1. The next steps undo the overlaps that remain, and start from the pushes of this
   /// one.
   int sweeps = 10;
+  /// Pushes of a chunk that do more than this part of their work beyond what overlaps ask for are lowered, in
+  /// (0, 1). With less each step pays for it: 5 % of the demo's time.
+  double excess = 0.25;
   /// As for sweeps without friction, but without over-relaxation: so few sweeps would overshoot and open
   /// gaps, into which grains fall; a column sank that way.
   MomentumParameters momentum{.over_relaxation = 1};
