@@ -227,10 +227,10 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
   return agreed([&] { check_threads(options, ranks, run.threads); });
 }
 
-std::vector<std::string> files_read(const RunOptions& options, const io::Scene& scene) {
-  std::vector<std::string> files = io::files_read(scene);
+std::vector<std::filesystem::path> files_read(const RunOptions& options, const io::Scene& scene) {
+  std::vector<std::filesystem::path> files = io::files_read(scene);
   for (const std::string& trace : {options.replay_order, options.task_times})
-    if (!trace.empty()) files.push_back(trace);
+    if (!trace.empty()) files.emplace_back(trace);
   return files;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -259,10 +260,10 @@ int study_certificate_command(const StudyCertificateOptions& options) {
   catch_signals();
   try {
     if (!options.scenes_from.empty()) given = given_scenes(options);
-    std::vector<std::string> inputs;
+    std::vector<fs::path> inputs;
     for (const io::Scene& scene : given) {
-      inputs.push_back(scene.source_file);
-      for (std::string& file : io::files_read(scene)) inputs.push_back(std::move(file));
+      inputs.emplace_back(scene.source_file);
+      std::ranges::move(io::files_read(scene), std::back_inserter(inputs));
     }
     lock.emplace(io::prepare_output_directory(directory, options.force, is_certificate_name, inputs));
   } catch (const std::exception& error) {

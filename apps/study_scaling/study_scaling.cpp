@@ -149,8 +149,8 @@ void prepare(const StudyScalingOptions& options, PreparedStudy& study) {
   if (study.no_weak.empty() && !study.plan.weak.empty()) demand_weak_sample(options, study.plan.weak);
   const std::string directory = options.out.empty() ? "out/scaling-" + sample.scene.name : options.out;
   if (options.reuse) study.recordings = read_recordings(fs::path(directory) / "traces" / "times.csv");
-  std::vector<std::string> inputs = io::files_read(scene);
-  inputs.push_back(options.scene);
+  std::vector<fs::path> inputs = io::files_read(scene);
+  inputs.emplace_back(options.scene);
   write_strong(sample, directory, options.reuse, [&] {
     study.lock.emplace(
         io::prepare_output_directory(directory, options.force || options.reuse,

@@ -36,16 +36,19 @@ fs::path link_in_the_way(const fs::path& directory, IsOutputName is_ours) {
   return {};
 }
 
-/// A name of the same file as one of the inputs would go with it.
-void demand_no_input(const fs::path& directory, const std::vector<fs::path>& former,
-                     const std::vector<std::string>& inputs) {
+/// Under whatever name. A file that is not there is none of them.
+bool is_one_of(const fs::path& file, const std::vector<fs::path>& files) {
   std::error_code unknown;
+  return std::ranges::any_of(files, [&](const fs::path& one) { return fs::equivalent(file, one, unknown); });
+}
+
+void demand_no_input(const fs::path& directory, const std::vector<fs::path>& former,
+                     const std::vector<fs::path>& inputs) {
   for (const fs::path& relative : former)
-    for (const std::string& input : inputs)
-      if (fs::equivalent(directory / relative, input, unknown))
-        throw FileError((directory / relative).string(),
-                        "is still to be read, and would be removed with the former results; choose another "
-                        "directory with --out");
+    if (is_one_of(directory / relative, inputs))
+      throw FileError((directory / relative).string(),
+                      "is still to be read, and would be removed with the former results; choose another "
+                      "directory with --out");
 }
 
 }  // namespace
@@ -94,7 +97,7 @@ std::vector<fs::path> outputs_in(const fs::path& directory, IsOutputName is_ours
 }
 
 DirectoryLock prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours,
-                                       const std::vector<std::string>& inputs, const fs::path& last) {
+                                       const std::vector<fs::path>& inputs, const fs::path& last) {
   try {
     if (fs::exists(directory) && !fs::is_directory(directory)) {
       throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
@@ -151,9 +154,8 @@ void check_output_files(const std::vector<fs::path>& inputs, const std::vector<f
   std::vector<fs::path> places;
   for (const fs::path& out : outs) {
     if (out.empty()) continue;
-    for (const fs::path& input : inputs)
-      if (fs::equivalent(input, out, error))
-        throw FileError(out.string(), "is what is read, and would be overwritten; give another name");
+    if (is_one_of(out, inputs))
+      throw FileError(out.string(), "is what is read, and would be overwritten; give another name");
     if (fs::is_directory(out, error)) throw FileError(out.string(), "is a folder; give the name of a file");
     const fs::path folder = fs::absolute(out).parent_path();
     if (!fs::is_directory(folder, error))

@@ -53,7 +53,7 @@ std::vector<std::filesystem::path> outputs_in(const std::filesystem::path& direc
 /// directory, or cannot be created or written to.
 [[nodiscard]] DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
                                                      IsOutputName is_ours,
-                                                     const std::vector<std::string>& inputs,
+                                                     const std::vector<std::filesystem::path>& inputs,
                                                      const std::filesystem::path& last = {});
 
 /// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.

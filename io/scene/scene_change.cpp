@@ -133,10 +133,11 @@ std::vector<std::string> input_files(const Scene& scene) {
   return files;
 }
 
-std::vector<std::string> files_read(const Scene& scene) {
-  std::vector<std::string> files = input_files(scene);
+std::vector<std::filesystem::path> files_read(const Scene& scene) {
+  const std::vector<std::string> named = input_files(scene);
+  std::vector<std::filesystem::path> files(named.begin(), named.end());
   for (const SampleSpec& sample : scene.samples)
-    if (sample.kind == SampleSpec::Kind::state) files.push_back(sample.file);
+    if (sample.kind == SampleSpec::Kind::state) files.emplace_back(sample.file);
   return files;
 }
 

@@ -2,6 +2,7 @@
 
 /// How two scenes differ: whether a run may go on under the other one.
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,6 @@ std::string describe(const SceneChange& change);
 /// a checkpoint itself, and not needed any more.
 std::vector<std::string> input_files(const Scene& scene);
 /// The same, and that state.
-std::vector<std::string> files_read(const Scene& scene);
+std::vector<std::filesystem::path> files_read(const Scene& scene);
 
 }  // namespace talus::io
