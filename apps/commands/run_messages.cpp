@@ -132,6 +132,11 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
   for (const InsertReport& insert : simulation.inserted()) {
     terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
                  counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
+    if (insert.placed == 0 && insert.no_room == 0)
+      terminal.warn(
+          "warning: insert '{}' placed no grain, as none was due: its `stage`, `from` and `until` leave it no "
+          "time in this run, or its rate is too low",
+          insert.name);
     if (insert.no_room > 0 && insert.waiting > 0)
       terminal.warn(
           "warning: insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "

@@ -63,22 +63,29 @@ std::vector<Part> split(const StepProblem& whole, std::span<const Vec3> run) {
 
 }  // namespace
 
-std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count) {
-  const std::size_t grains = problem.mass.size(), cell = grains + problem.wall_normal.size(),
-                    bodies = cell + 1;
-  std::vector<std::size_t> parent(bodies);
+std::vector<std::size_t> joined_bodies(const StepProblem& problem,
+                                       const std::function<bool(std::size_t)>& joins) {
+  const std::size_t grains = problem.mass.size(), cell = grains + problem.wall_normal.size();
+  std::vector<std::size_t> parent(cell + 1), set;
   std::iota(parent.begin(), parent.end(), std::size_t{0});
-  for (const StepContact& contact : problem.contacts) {
-    if (contact.at_wall() && problem.wall_inv_mass[contact.wall()] == 0) continue;
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+    const StepContact& contact = problem.contacts[c];
+    if (!joins(c) || (contact.at_wall() && problem.wall_inv_mass[contact.wall()] == 0)) continue;
     const std::size_t other = contact.at_wall() ? grains + contact.wall() : contact.other();
     parent[root_of(parent, other)] = root_of(parent, contact.first);
     if (problem.cell.follows() && !contact.at_wall()) parent[root_of(parent, cell)] = root_of(parent, other);
   }
-  std::vector<std::size_t> number(bodies, bodies), cluster;
+  for (std::size_t b = 0; b <= cell; ++b) set.push_back(root_of(parent, b));
+  return set;
+}
+
+std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count) {
+  const std::vector<std::size_t> set = joined_bodies(problem, [](std::size_t) { return true; });
+  std::vector<std::size_t> number(set.size(), set.size()), cluster;
   count = 0;
   for (const StepContact& contact : problem.contacts) {
-    std::size_t& own = number[root_of(parent, contact.first)];
-    if (own == bodies) own = count++;
+    std::size_t& own = number[set[contact.first]];
+    if (own == set.size()) own = count++;
     cluster.push_back(own);
   }
   return cluster;

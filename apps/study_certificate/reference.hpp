@@ -8,6 +8,7 @@
 /// so no accusation that another choice among right answers could have earned.
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -59,6 +60,12 @@ struct Reference {
 
   double uncertainty() const { return exchanged > 0 ? error / exchanged : 0; }
 };
+
+/// Per grain, then per wall, then of the cell: a number that those have in common which contacts join, of
+/// which joins(c) is true. Driven and fixed walls join nothing; a cell that follows a stress is joined by all
+/// contacts between grains.
+std::vector<std::size_t> joined_bodies(const StepProblem& problem,
+                                       const std::function<bool(std::size_t)>& joins);
 
 /// Number of the cluster of each contact: contacts that share a grain or a pushed wall are of one, and
 /// so are all between grains of a cell that follows a stress. `count`:

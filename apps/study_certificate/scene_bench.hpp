@@ -75,5 +75,6 @@ void make_mesh_drum(SceneBench& bench);
 void make_shaken(SceneBench& bench);
 void make_sticky(SceneBench& bench);
 void make_apart(SceneBench& bench);
+void make_touching(SceneBench& bench);
 
 }  // namespace talus::audit

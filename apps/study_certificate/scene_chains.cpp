@@ -189,4 +189,20 @@ void make_apart(SceneBench& bench) {
   bench.add_moving(above + Vec3(r, 0, 0), r, -u);
 }
 
+void make_touching(SceneBench& bench) {
+  Draws& draws = bench.draws;
+  draws.chance(0.5) ? make_column(bench) : make_among(bench);
+  std::vector<Wall>& walls = bench.made.scene.setup.walls;
+  std::erase_if(walls, [](const Wall& wall) { return wall.name == "z+"; });  // a lid would be in their way
+  const auto& grains = bench.made.grains;
+  std::size_t top = 0;
+  for (std::size_t k = 1; k < grains.x.size(); ++k)
+    if (grains.x[k][2] > grains.x[top][2]) top = k;
+  const double beside = grains.radius[top], r = beside * draws.between_decades(0.05, 1);
+  const Vec3 at_its_height = grains.x[top] - Vec3(beside + r, 0, 0);
+  const Vec3 u(0, 0, bench.speed_of_fall() * draws.between_decades(0.1, 1e3));
+  bench.add_moving(at_its_height, r, u);
+  bench.add_moving(at_its_height + Vec3(0, 0, 2 * r), r, -u);
+}
+
 }  // namespace talus::audit

@@ -37,7 +37,9 @@ constexpr std::array families = {
     SceneFamily{"mesh", "grains in a prism of triangles that moves, around a block of them", make_mesh_drum},
     SceneFamily{"shaken", "grains in a box whose walls tilt, shake or run as belts", make_shaken},
     SceneFamily{"sticky", "grains that hold one another and their walls", make_sticky},
-    SceneFamily{"apart", "two grains that collide far above others, and much faster", make_apart}};
+    SceneFamily{"apart", "two grains that collide far above others, and much faster", make_apart},
+    SceneFamily{"touching", "a column, and two grains that collide beside its top and touch it",
+                make_touching}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;

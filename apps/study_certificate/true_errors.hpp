@@ -20,7 +20,7 @@ struct TrueErrors {
   /// as walls: sum r (x) b/d of all contacts, a column for each axis.
   double wall_force = 0;
   double contact_force = 0;  ///< cf: largest error of a contact's impulse over the largest contact impulse
-  double cluster = 0;        ///< V of the connected cluster of contacts where it is largest
+  double cluster = 0;        ///< V of the bodies that push one another where it is largest
   double energy = 0;         ///< energy gained that neither loads nor the time step explain, over the kinetic
                              ///< energy without contacts; 0 where walls move and with cohesion
 };

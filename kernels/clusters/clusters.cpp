@@ -3,37 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "kernels/bodies/index.hpp"
+#include "kernels/clusters/disjoint_sets.hpp"
 
 namespace talus {
 
 namespace {
-
-/// Disjoint sets of 0 .. n - 1, each named by its lowest member.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
-
-  std::int32_t find(std::int32_t k) {
-    while (parent_[at(k)] != k) {
-      parent_[at(k)] = parent_[at(parent_[at(k)])];
-      k = parent_[at(k)];
-    }
-    return k;
-  }
-  void join(std::int32_t a, std::int32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[at(std::max(a, b))] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::int32_t> parent_;
-};
 
 /// The clusters of one part, numbered by their lowest bodies. Shared bodies may have their contacts
 /// elsewhere: each is in a cluster.

@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/index.hpp"
 #include "kernels/clusters/cluster_problem.hpp"
+#include "kernels/clusters/loaded_groups.hpp"
 #include "kernels/global/stiffness.hpp"
 
 namespace talus {
@@ -79,6 +80,121 @@ double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
                    thresholds.rounding * most_momentum(row[mass], row[incoming])});
 }
 
+/// A group of bodies that push one another, and its answer.
+struct AnsweredGroup {
+  LoadedGroup group;
+  ClusterAnswer answer;
+  double scale = 0;  ///< what its errors are compared with [N s]
+  double floor = 0;  ///< what is done elsewhere makes of that [N s]
+  double noise = 0;  ///< what rounding leaves of its momentum [N s]
+
+  bool same_as(const LoadedGroup& other) const {
+    return group.bodies.front() == other.bodies.front() && group.bodies.size() == other.bodies.size();
+  }
+};
+
+/// What the contacts of all clusters do: a floor for each.
+struct Everywhere {
+  double scale = 0;  ///< [N s]
+  double mass = 0;   ///< [kg]
+};
+
+/// Sets what the errors of a group are compared with.
+void measure_group(const Everywhere& everywhere, const ErrorGoal& goal, const StepErrorThresholds& thresholds,
+                   AnsweredGroup& own) {
+  const Measures row = measures_of(own.group.problem, goal.faces);
+  const double share = everywhere.mass > 0 ? row[mass] / everywhere.mass : 0;
+  // What rounding makes must pass whatever is asked.
+  const double still = row[mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
+  own.floor = thresholds.elsewhere * everywhere.scale * share;
+  own.scale = std::max({scale_of(row, thresholds), own.floor, still});
+  own.noise = std::max(thresholds.rounding * most_momentum(row[mass], row[incoming]), still);
+}
+
+/// `relative`: error that need not be told apart.
+void answer_group(double relative, const ErrorGoal& goal, const StepErrorThresholds& thresholds,
+                  AnsweredGroup& own) {
+  own.answer = solve_cluster(own.group.problem, {relative * own.scale, relative, goal.sweeps, goal.still},
+                             thresholds.cluster);
+}
+
+/// The groups of a cluster that `joins` makes; those that are as before keep their answers.
+std::vector<AnsweredGroup> answered(const BodyProblem& cluster, std::span<const char> joins,
+                                    std::vector<AnsweredGroup> before, const Everywhere& everywhere,
+                                    const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
+  std::vector<AnsweredGroup> groups;
+  auto old = before.begin();
+  for (LoadedGroup& group : loaded_groups(cluster, joins)) {
+    // Both are in order of their lowest bodies, and groups only grow.
+    while (old != before.end() && old->group.bodies.front() < group.bodies.front()) ++old;
+    if (old != before.end() && old->same_as(group)) {
+      groups.push_back(std::move(*old++));
+    } else {
+      groups.push_back({std::move(group), {}});
+      measure_group(everywhere, goal, thresholds, groups.back());
+      answer_group(goal.enough, goal, thresholds, groups.back());
+    }
+  }
+  return groups;
+}
+
+/// Joins those between which a contact closes under their answers: true where there are any.
+bool join_closing(const BodyProblem& cluster, const std::vector<AnsweredGroup>& groups, double least,
+                  std::vector<char>& joins) {
+  if (groups.size() == 1) return false;
+  std::vector<Twist> V(cluster.bodies.size());
+  std::vector<std::size_t> of_body(cluster.bodies.size());
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const BodyProblem& problem = groups[g].group.problem;
+    const std::vector<Twist> own = added(velocities_of(problem, problem.impulse),
+                                         groups[g].answer.solved ? 1 : 0, groups[g].answer.motion);
+    for (std::size_t b = 0; b < own.size(); ++b) {
+      V[groups[g].group.bodies[b]] = own[b];
+      of_body[groups[g].group.bodies[b]] = g;
+    }
+  }
+  bool any = false;
+  for (std::size_t k = 0; k < cluster.contacts.size(); ++k) {
+    const ContactEquation& c = cluster.contacts[k];
+    if (joins[k] != 0 || c.second < 0 || of_body[at(c.first)] == of_body[at(c.second)]) continue;
+    const double scale = std::min(groups[of_body[at(c.first)]].scale, groups[of_body[at(c.second)]].scale);
+    if (closing(cluster, c, V) <= least * scale) continue;
+    joins[k] = 1;
+    any = true;
+  }
+  return any;
+}
+
+/// Joins what an answer of the whole cluster has carry, known as exactly as the group asks that exchanges
+/// least: where forces have yet to reach much of a cluster, that would take a round for each contact.
+void join_by_whole(const BodyProblem& cluster, const std::vector<AnsweredGroup>& groups,
+                   const Everywhere& everywhere, const ErrorGoal& goal, const StepErrorThresholds& thresholds,
+                   std::vector<char>& joins) {
+  AnsweredGroup whole{{cluster, {}, {}}, {}};
+  measure_group(everywhere, goal, thresholds, whole);
+  double least = whole.scale;
+  for (const AnsweredGroup& own : groups)
+    if (own.scale > 0 && !own.group.contacts.empty()) least = std::min(least, own.scale);
+  answer_group(whole.scale > 0 ? goal.enough * least / whole.scale : goal.enough, goal, thresholds, whole);
+  for (std::size_t k = 0; k < joins.size(); ++k)
+    if (cluster.impulse[k] + whole.answer.found[k] != Vec3::Zero()) joins[k] = 1;
+}
+
+/// The answers to a cluster's groups, such that no contact between them closes.
+std::vector<AnsweredGroup> answered_groups(const BodyProblem& cluster, const Everywhere& everywhere,
+                                           const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
+  std::vector<char> joins = carrying(cluster);
+  std::vector<AnsweredGroup> groups = answered(cluster, joins, {}, everywhere, goal, thresholds);
+  for (int round = 1; join_closing(cluster, groups, thresholds.closing * goal.enough, joins); ++round) {
+    if (round == thresholds.most_rounds)
+      join_by_whole(cluster, groups, everywhere, goal, thresholds, joins);
+    else if (round == 2 * thresholds.most_rounds)
+      std::ranges::fill(joins, char{1});
+    groups = answered(cluster, joins, std::move(groups), everywhere, goal, thresholds);
+  }
+  return groups;
+}
+
 /// Where the answers of clusters come together: those that several processes hold count in one of them.
 class Answers {
  public:
@@ -88,10 +204,7 @@ class Answers {
       const std::size_t part = part_of(clusters_[c].subdomain());
       if (part < parts.size()) own_[part].push_back(c);
     }
-    answers_.resize(clusters_.size());
-    scales_.resize(clusters_.size());
-    floors_.resize(clusters_.size());
-    noise_.resize(clusters_.size());
+    groups_.resize(clusters_.size());
   }
 
   void solve(const ErrorGoal& goal) {
@@ -99,32 +212,22 @@ class Answers {
     each([&](std::size_t c) { rows[c] = measures_of(clusters_[c].problem, goal.faces); });
     const Measures all = total(rows);
     exchanged_ = {all[energy], all[grains]};
-    const double everywhere = scale_of(all, thresholds_);
+    const Everywhere everywhere{scale_of(all, thresholds_), all[mass]};
     each([&](std::size_t c) {
-      const double share = all[mass] > 0 ? rows[c][mass] / all[mass] : 0;
-      // What rounding makes must pass whatever is asked.
-      const double still =
-          rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
-      floors_[c] = thresholds_.elsewhere * everywhere * share;
-      scales_[c] = std::max({scale_of(rows[c], thresholds_), floors_[c], still});
-      noise_[c] = std::max(thresholds_.rounding * most_momentum(rows[c][mass], rows[c][incoming]), still);
-      answers_[c] = solve_cluster(clusters_[c].problem,
-                                  {goal.enough * scales_[c], goal.enough, goal.sweeps, goal.still},
-                                  thresholds_.cluster);
+      groups_[c] = answered_groups(clusters_[c].problem, everywhere, goal, thresholds_);
     });
   }
 
   StepError error(const ErrorGoal& goal) const {
     const double enough = goal.enough;
     StepError error;
-    error.velocity = largest([&](std::size_t c) { return velocity_error(c); });
+    error.velocity = largest([&](const AnsweredGroup& own) { return velocity_error(own); });
     error.wall = wall_error(goal);
-    const auto contact = [&](std::size_t c) { return contact_error(c); };
-    error.contact = largest(contact);
+    error.contact = largest(contact_error);
     const auto any = [&](bool ClusterAnswer::*which, bool value) {
-      return largest([&](std::size_t c) {
-               const bool wrong = !(larger(velocity_error(c), contact(c)) <= enough);
-               return wrong && answers_[c].*which == value ? 1.0 : 0.0;
+      return largest([&](const AnsweredGroup& own) {
+               const bool wrong = !(larger(velocity_error(own), contact_error(own)) <= enough);
+               return wrong && own.answer.*which == value ? 1.0 : 0.0;
              }) > 0;
     };
     error.mends = any(&ClusterAnswer::helps, true);
@@ -153,39 +256,37 @@ class Answers {
     std::ranges::copy(all, sum.begin());
     return sum;
   }
-  double largest(const std::function<double(std::size_t)>& value) const {
+  double largest(const std::function<double(const AnsweredGroup&)>& value) const {
     const std::vector<double> rows = parts_.rows(1, [&](std::size_t p, std::span<double> row) {
-      for (const std::size_t c : own_[p]) row[0] = larger(row[0], value(c));
+      for (const std::size_t c : own_[p])
+        for (const AnsweredGroup& own : groups_[c]) row[0] = larger(row[0], value(own));
     });
     double most = 0;
     for (const double row : rows) most = larger(most, row);
     return most;
   }
 
-  double velocity_error(std::size_t c) const {
-    const double momentum = answers_[c].error;
-    if (!answers_[c].solved) return larger(thresholds_.unknown, scales_[c] > 0 ? momentum / scales_[c] : 0);
+  double velocity_error(const AnsweredGroup& own) const {
+    const double momentum = own.answer.error;
+    if (!own.answer.solved) return larger(thresholds_.unknown, own.scale > 0 ? momentum / own.scale : 0);
     if (momentum == 0) return 0;
     // Where nothing moves overlaps may still ask for it.
-    return scales_[c] > 0 ? momentum / scales_[c] : std::numeric_limits<double>::infinity();
+    return own.scale > 0 ? momentum / own.scale : std::numeric_limits<double>::infinity();
   }
-  double largest_impulse(std::size_t c) const {
-    return talus::largest_impulse(clusters_[c].problem, answers_[c].found);
-  }
-  /// The largest change of a contact's impulse, over the largest impulse of its cluster, or what is done
+  /// The largest change of a contact's impulse, over the largest impulse of its group, or what is done
   /// elsewhere, or what rounding leaves. How fast walls or a flow are says nothing of forces.
-  double contact_error(std::size_t c) const {
+  static double contact_error(const AnsweredGroup& own) {
     double change = 0;
-    for (const Vec3& by : answers_[c].found) change = larger(change, by.norm());
+    for (const Vec3& by : own.answer.found) change = larger(change, by.norm());
     if (change == 0) return 0;
-    return change / std::max({largest_impulse(c), floors_[c], noise_[c]});
+    return change / std::max({largest_impulse(own.group.problem, own.answer.found), own.floor, own.noise});
   }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least
   /// ErrorGoal::walls: the largest.
   double wall_error(const ErrorGoal& goal) const {
-    const double walls = largest([&](std::size_t c) {
+    const double walls = largest([](const AnsweredGroup& own) {
       double count = 0;
-      for (const ContactEquation& k : clusters_[c].problem.contacts) count = std::max(count, k.wall + 1.0);
+      for (const ContactEquation& k : own.group.problem.contacts) count = std::max(count, k.wall + 1.0);
       return count;
     });
     const auto first_face = static_cast<std::size_t>(walls);
@@ -196,11 +297,11 @@ class Answers {
         Eigen::Map<Vec3>(&row[6 * wall]) += impulse + change;
         Eigen::Map<Vec3>(&row[6 * wall + 3]) += change;
       };
-      for (const std::size_t c : own_[p])
-        for (std::size_t k = 0; k < answers_[c].found.size(); ++k) {
-          const BodyProblem& problem = clusters_[c].problem;
+      const auto add_group = [&](const AnsweredGroup& own) {
+        const BodyProblem& problem = own.group.problem;
+        for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
           const ContactEquation& contact = problem.contacts[k];
-          const Vec3 &impulse = problem.impulse[k], &change = answers_[c].found[k];
+          const Vec3 &impulse = problem.impulse[k], &change = own.answer.found[k];
           if (contact.wall >= 0) add(at(contact.wall), impulse, change);
           const Vec3 share = face_shares(problem, contact, goal.faces);
           for (std::size_t face = first_face; face < n; ++face) {
@@ -208,6 +309,8 @@ class Answers {
             add(face, part * impulse, part * change);
           }
         }
+      };
+      for (const std::size_t c : own_[p]) std::ranges::for_each(groups_[c], add_group);
     });
     double scale = goal.walls, error = 0;
     for (std::size_t w = 0; w < n; ++w) {
@@ -221,23 +324,21 @@ class Answers {
     for (std::size_t p = 0; p < parts_.size(); ++p)
       change[p].assign(parts_[p].contacts.size(), Vec3(Vec3::Zero()));
     for (std::size_t c = 0; c < clusters_.size(); ++c)
-      for (std::size_t k = 0; k < clusters_[c].contacts.size() && answers_[c].helps; ++k) {
-        const ClusterProblem::Place& place = clusters_[c].contacts[k];
-        if (const std::size_t p = part_of(place.subdomain); p < parts_.size())
-          change[p][at(place.number)] = answers_[c].impulse[k];
-      }
+      for (const AnsweredGroup& own : groups_[c])
+        for (std::size_t k = 0; k < own.group.contacts.size() && own.answer.helps; ++k) {
+          const ClusterProblem::Place& place = clusters_[c].contacts[own.group.contacts[k]];
+          if (const std::size_t p = part_of(place.subdomain); p < parts_.size())
+            change[p][at(place.number)] = own.answer.impulse[k];
+        }
     return change;
   }
 
   const BodyParts& parts_;
   std::vector<ClusterProblem> clusters_;
   const StepErrorThresholds& thresholds_;
-  std::vector<std::vector<std::size_t>> own_;  ///< per part: clusters that it answers for
-  std::vector<ClusterAnswer> answers_;
-  std::vector<double> scales_;  ///< [N s]
-  std::vector<double> floors_;  ///< what is done elsewhere makes of them [N s]
-  std::vector<double> noise_;   ///< what rounding leaves of momenta [N s]
-  Exchanged exchanged_;         ///< by all of them
+  std::vector<std::vector<std::size_t>> own_;       ///< per part: clusters that it answers for
+  std::vector<std::vector<AnsweredGroup>> groups_;  ///< per cluster
+  Exchanged exchanged_;                             ///< by all of them
 };
 
 }  // namespace

@@ -22,6 +22,11 @@ struct StepErrorThresholds {
   /// impulses of its contacts, too. What happens elsewhere in a step must not hide that a column at rest
   /// falls: a ball that hits the floor beside it at 5 m/s does 5000 times as much, per mass.
   double elsewhere = 1e-6;
+  /// Contacts that carry nothing part a cluster into groups, unless under the answers of these they close with
+  /// more than this part, in (0, 1), of what need not be told apart. Behind so many rounds of joining those
+  /// that do, >= 1, what an answer of the whole cluster has carry joins, too, and behind twice as many all.
+  double closing = 1e-2;
+  int most_rounds = 4;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = BalanceThresholds{}.rounding;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says

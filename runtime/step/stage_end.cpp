@@ -7,6 +7,9 @@ namespace talus {
 
 namespace {
 
+/// Sums of the parts of steps may fall short of 1 by their rounding.
+constexpr double whole = 1 - 1e-9;
+
 /// Part of a window of the steady state that a step takes.
 double part_of_window(const StageEnd& end, const StageStep& step) {
   return end.steady_time ? step.time_step / *end.steady_time : step.shear / end.steady_strain;
@@ -26,8 +29,6 @@ void StageMemory::add(const StageEnd& end, const StageStep& step) {
   weight += step.time_step;
   sums[0] += step.time_step * step.stress_ratio;
   sums[1] += step.time_step * step.solid_fraction;
-  // Sums of parts may fall short of 1 by their rounding.
-  constexpr double whole = 1 - 1e-9;
   if (window < whole) return;
   window = 0;
   // Without a stress in any step, as before grains meet, nothing is said of a steady state.
@@ -59,8 +60,11 @@ StageDone stage_done(const Stage& stage, const StageProgress& progress) {
     consider("time", stage.chooses_time_step ? progress.clock.fraction()
                                              : steps / steps_in(*end.time, stage.time_step));
   if (progress.steps == 0) return nearest;
-  if (end.strain) consider("strain", std::abs(progress.strain) / *end.strain);
-  if (end.shear_strain) consider("shear_strain", progress.sheared / *end.shear_strain);
+  const auto consider_path = [&](const char* by, double fraction) {
+    consider(by, fraction >= whole ? std::max(fraction, 1.0) : fraction);
+  };
+  if (end.strain) consider_path("strain", std::abs(progress.strain) / *end.strain);
+  if (end.shear_strain) consider_path("shear_strain", progress.sheared / *end.shear_strain);
   if (progress.held > 0 && progress.held >= end.equilibrium_hold * progress.fall_time)
     consider("equilibrium", 1);
   if (end.stress_ratio) consider("stress_ratio", memory.stress_ratio / *end.stress_ratio);

@@ -66,6 +66,55 @@ TEST(StepError, OfAColumnIsNotHiddenByAFarFasterGrainBesideIt) {
   EXPECT_NEAR(error.contact, 0.3, 1e-6);
 }
 
+/// The ball touches the column's top from the side, and the contact carries nothing.
+TEST(StepError, OfAColumnIsNotHiddenByAFarFasterGrainThatItTouches) {
+  for (const double part : {0.7, 1.0}) {
+    BodyProblem problem;
+    add_column(problem, 10, 0, part);
+    const std::int32_t grain = add_grain(problem, Vec3(0.02, 0, 0.19), 0);
+    problem.bodies.back().free.u = Vec3(0, 0, -5000 * fall);
+    add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
+    problem.impulse.back() = Vec3(0, 0, 5000 * fall);
+    add_contact(problem, grain, 9, Vec3::UnitX(), 0);
+    const StepError error = step_error(problem, {.enough = 1e-4});
+    EXPECT_NEAR(error.velocity, (1 - part) / part, 1e-2);
+    EXPECT_NEAR(error.contact, 1 - part, 1e-6);
+    EXPECT_EQ(error.mends, part < 1);
+  }
+}
+
+/// A step whose sweeps have not come far: the upper grains of the column fall as if alone.
+TEST(StepError, OfAColumnThatForcesHaveYetToReachIsNotHiddenEither) {
+  BodyProblem problem;
+  add_column(problem, 60, 0, 1);
+  for (std::size_t k = 10; k < 60; ++k) problem.impulse[k].setZero();
+  for (std::size_t k = 0; k < 10; ++k) problem.impulse[k] = Vec3(0, 0, static_cast<double>(10 - k) * fall);
+  const std::int32_t grain = add_grain(problem, Vec3(0.02, 0, 1.19), 0);
+  problem.bodies.back().free.u = Vec3(0, 0, -5000 * fall);
+  add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
+  problem.impulse.back() = Vec3(0, 0, 5000 * fall);
+  add_contact(problem, grain, 59, Vec3::UnitX(), 0);
+  const StepError error = step_error(problem, {.enough = 1e-4});
+  EXPECT_TRUE(error.mends);
+  EXPECT_GT(error.velocity, 1);
+  EXPECT_NEAR(error.contact, 50. / 60, 1e-6);
+  EXPECT_NEAR(error.change[0][0][2], 50 * fall, 1e-6);
+}
+
+/// Where the answer of one group runs into another, they have one answer together: a grain that lies loosely
+/// on a column which comes up.
+TEST(StepError, OfGroupsThatAreAboutToMeetIsThatOfAll) {
+  BodyProblem problem;
+  add_column(problem, 2, 0, 0);
+  problem.bodies[0].free.u = Vec3(0, 0, 1);
+  problem.bodies[1].free.u = Vec3(0, 0, 0);
+  const StepError error = step_error(problem, {.enough = 1e-6});
+  EXPECT_TRUE(error.mends);
+  EXPECT_NEAR(error.change[0][1][2], 0.5, 1e-6);
+  EXPECT_NEAR(error.change[0][0][2], 0, 1e-6);
+  EXPECT_GT(error.velocity, 1) << "without an impulse nothing is exchanged";
+}
+
 /// Three grains in a row that fills a cell along x, which a pressure closes with `momentum`: impulses `part`
 /// of what they carry.
 BodyProblem row_in_a_cell(double momentum, double part) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "runtime/step/cell_report.hpp"
 #include "runtime/step/simulation.hpp"
@@ -117,6 +118,22 @@ TEST(StressRatio, EndsAStageWithTheStepThatReachesIt) {
   }
   EXPECT_STREQ(simulation.end_reached(), "stress_ratio");
   EXPECT_EQ(simulation.steps_of_stage(), 101);
+}
+
+// 200 steps of 5e-4 each make a strain of 0.1, though their sum may fall short of that by rounding.
+TEST(Strain, IsReachedByStepsWhoseSumRoundingLeavesShort) {
+  Stage stage;
+  stage.end.strain = stage.end.shear_strain = 0.1;
+  const StageClock clock;
+  const StageMemory memory;
+  for (const double short_by : {1e-15, 1e-6}) {
+    StageProgress progress{.steps = 200, .clock = clock, .memory = memory};
+    progress.strain = -0.1 * (1 - short_by);
+    EXPECT_EQ(stage_done(stage, progress).fraction >= 1, short_by < 1e-9);
+    std::swap(progress.strain, progress.sheared);
+    progress.sheared *= -1;
+    EXPECT_EQ(stage_done(stage, progress).fraction >= 1, short_by < 1e-9);
+  }
 }
 
 // Cubes of smooth grains bear no shear: a cell that is sheared ever faster by a stress is in no equilibrium,
