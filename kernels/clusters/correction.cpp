@@ -128,8 +128,9 @@ bool stand(const BodyProblem& problem, const std::vector<ContactState>& then, do
 /// light bodies pass the force on between heavy ones, much of the forces behind next to no momentum.
 bool converged(const BodyProblem& problem, const Correction& now, double goal,
                const CorrectionThresholds& thresholds) {
-  return now.updated <= larger(goal, now.left) &&
-         (has_friction(problem) || now.pushed <= thresholds.same_forces);
+  const double most = larger(goal, now.left);
+  return now.updated <= most &&
+         (has_friction(problem) ? now.coming <= most : now.pushed <= thresholds.same_forces);
 }
 
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
@@ -146,11 +147,17 @@ class Round {
   /// The motion; the multipliers go to the set's `change`, what is missed and left to `result`.
   std::vector<Twist> solve(Correction& result) {
     std::vector<Twist> motion(all_.bodies.size());
+    double before = std::numeric_limits<double>::infinity();
     for (int update = 0; update < thresholds_.most_updates; ++update) {
       FirmContacts::Solution solution = firm_.solve(force());
       result.left = momentum_of(all_, solution.last);
       const bool granted = take_multipliers(solution.motion, result);
-      result.updated = momentum_of(all_, added(solution.motion, -1, motion));
+      const double moved = momentum_of(all_, added(solution.motion, -1, motion));
+      // The first update says nothing of how fast they decay.
+      const bool alone = update == 0 && moved > result.left;
+      result.coming = alone ? std::numeric_limits<double>::infinity() : rest_of(before, moved, result.left);
+      result.updated = moved;
+      before = moved;
       motion = std::move(solution.motion);
       if (granted &&
           converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_))
@@ -266,7 +273,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   double least = std::numeric_limits<double>::infinity();
   const int most = friction ? thresholds.most_sliding_rounds : thresholds.most_rounds;
   int rounds = 0;
-  double at_first = 0;
+  double at_first = 0, moved_before = std::numeric_limits<double>::infinity();
   for (int since = 0; rounds < most && since < thresholds.patience; ++since) {
     ++rounds;
     Correction now;
@@ -277,7 +284,9 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     now.found = momentum_of(problem, motion);
     const std::vector<ContactState> then = set.state;
     now.open = see_states(problem, motion, set);
-    now.moved = momentum_of(problem, added(motion, -1, before));
+    const double moved = momentum_of(problem, added(motion, -1, before));
+    now.moved = larger(moved, rest_of(moved_before, moved, now.left));
+    moved_before = moved;
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
     const bool stays = friction ? set.state == then : stand(problem, then, thresholds.rounding, set);
     if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)

@@ -72,10 +72,12 @@ struct Correction {
   double open = 0;            ///< what the natural map still finds wrong behind the last round [N s]
   double left = 0;            ///< what rounding may leave of the linear system [N s]
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
-  double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
-  double updated = 0;         ///< likewise the last update of the multipliers
-  double pushed = 0;          ///< by which that, or the last proximal step, has changed an impulse, over the
-                              ///< largest impulse, at most
+  double moved = 0;  ///< momentum by which the last round has changed the motion, or further ones will by the
+                     ///< ratio of the last two, if that is more [N s]
+  double updated = 0;  ///< likewise the last update of the multipliers
+  double coming = 0;   ///< and what further ones would add, by the ratio of the last two [N s]
+  double pushed = 0;   ///< by which that, or the last proximal step, has changed an impulse, over the
+                       ///< largest impulse, at most
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
                          ///< changed next to nothing; and rounding leaves less than need not be known. Of
