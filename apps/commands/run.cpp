@@ -108,6 +108,7 @@ void read_recordings(const RunOptions& options, const graph::Communicator& ranks
 
 /// The sample, on rank 0, and the walls that are placed by it.
 void place_sample(Prepared& run) {
+  demand_memory_of_graph(run.scene);
   if (run.scene.from_state()) {
     StateSample state = read_state(run.scene);
     run.sample = build_sample(run.scene, std::move(state.sample));

@@ -268,6 +268,7 @@ class Certificate {
   double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
   double claimed(double error, WholeProblem& whole);
+  double exchanged_over_walls() const;
   bool large_ask_for_more(WholeProblem& whole);
   double drifting(WholeProblem& whole);
   /// Relative error of velocities by the work of the contacts' errors.

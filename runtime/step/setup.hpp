@@ -167,12 +167,14 @@ struct SolverSettings {
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
   /// On velocity_error, of clusters that no direct solve takes; 0: balance_tolerance, with friction
-  /// sliding_over_balance times that (docs/decisions/0030-work-of-errors.md).
+  /// sliding_over_balance times that, at most 1, as what is wrong by all that is exchanged says nothing
+  /// (docs/decisions/0030-work-of-errors.md).
   double velocity_tolerance = 0;
   static constexpr double sliding_over_balance = 10;
   double velocity_allowed(bool friction) const {
     if (velocity_tolerance > 0) return velocity_tolerance;
-    return (friction ? sliding_over_balance : 1) * balance_tolerance;
+    return friction ? std::max(balance_tolerance, std::min(sliding_over_balance * balance_tolerance, 1.0))
+                    : balance_tolerance;
   }
   /// Clusters of more bodies are judged by estimates alone, whatever SmallClusters allows, in [0, 5000].
   int direct_bodies = 5000;

@@ -209,7 +209,7 @@ def test_a_sweep_is_a_product_with_a_table(heap, tmp_path):
                     measure={"a": lambda run: run.no_such_table, "grains": lambda run: len(run.frame(-1).ids)})
     assert talus.read_table(tmp_path / "sweep" / "sweep.csv")["grains"].tolist() == [60] * 4
     written = (tmp_path / "sweep" / "sweep.csv").read_bytes()
-    with pytest.raises(FileExistsError):
+    with pytest.raises(FileExistsError, match="a sweep of other values"):
         talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.2, 0.6], resume=True)
     assert (tmp_path / "sweep" / "sweep.csv").read_bytes() == written
 
@@ -219,6 +219,11 @@ def test_a_sweep_says_which_key_it_does_not_know(heap, tmp_path):
         talus.sweep(heap, tmp_path / "sweep", frictoin=[1])
     with pytest.raises(talus.SceneError, match="must be >= 0"):
         talus.sweep(heap, tmp_path / "sweep", friction=[0.1, -1])
+    for name in ("material.friction", "steps", "digest"):
+        with pytest.raises(ValueError, match=f"a column of its own called {name}"):
+            talus.sweep(heap, tmp_path / "sweep", friction=[0.1], measure={name: lambda run: 1.0})
+    with pytest.raises(ValueError, match="jobs must be 1 or more"):
+        talus.sweep(heap, tmp_path / "sweep", friction=[0.1], jobs=0)
     assert not (tmp_path / "sweep").exists(), "nothing is run before all scenes are sound"
 
 

@@ -103,6 +103,23 @@ def test_more_than_half_of_the_box_is_refused():
         talus.pair_correlation(lattice(3), [0] * 3, [3] * 3, 1.6)
 
 
+def test_corners_that_are_no_box_are_refused():
+    x = np.full((4, 3), 0.5)
+    for low, high in (([1, 1, 1], [0, 0, 0]), ([0, 0, 0], [1, 1, 0]), ([0, 0, 0], [1, 1, np.inf])):
+        with pytest.raises(ValueError, match="no corners of a box"):
+            talus.pair_correlation(x, low, high, r_max=0.1)
+    with pytest.raises(ValueError, match="there are none"):
+        talus.pair_correlation(np.zeros((0, 3)), [0, 0, 0], [1, 1, 1], r_max=0.1)
+
+
+def test_forces_and_normals_that_are_no_numbers_are_refused():
+    with pytest.raises(ValueError, match="1 of 3 are no numbers"):
+        talus.force_distribution([1, np.nan, 2])
+    for normals in ([[1, 0, 0], [np.nan, 0, 0]], [[1, 0, 0], [2, 0, 0]]):
+        with pytest.raises(ValueError, match="1 of 2 are no unit vectors"):
+            talus.fabric_tensor(normals)
+
+
 def test_centres_that_are_no_numbers_are_refused():
     x = lattice(3)
     x[4, 1] = np.nan

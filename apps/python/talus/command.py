@@ -151,7 +151,7 @@ class _SceneFile:
     def holds_another(self) -> bool:
         return self.former is not None and self.former not in (self.marked, self.plain)
 
-    def demand_place(self, replace: bool) -> None:
+    def demand_place(self, replace: bool, advice: str) -> None:
         """Raises FileExistsError where there is another scene that must stay."""
         if self.path.is_symlink():
             raise FileExistsError(f"{self.path}: is a symbolic link, and the scene would be written there; choose another "
@@ -163,11 +163,11 @@ class _SceneFile:
             raise FileExistsError(f"{self.path}: exists, and is not as talus.run writes scenes, which would be written there; "
                                   "choose another directory of results")
         if not replace:
-            raise FileExistsError(f"{self.path}: exists and holds another scene; force=True begins anew, resume=True goes on "
-                                  "with the changed scene, or choose another directory")
+            raise FileExistsError(f"{self.path}: exists and holds another scene; {advice}")
 
     def put(self, replace: bool) -> None:
-        self.demand_place(replace)
+        self.demand_place(replace, "force=True begins anew, resume=True goes on with the changed scene, or choose another "
+                                   "directory")
         if self.former is None or self.holds_another():
             self._write(self.marked)
 
@@ -193,9 +193,10 @@ class _SceneFile:
             raise
 
 
-def demand_place_of_scene(scene: Scene, directory: Path, replace: bool) -> None:
-    """Raises FileExistsError where `run` would not write the scene beside the results in `directory`."""
-    _SceneFile(scene, directory).demand_place(replace)
+def demand_place_of_scene(scene: Scene, directory: Path, replace: bool, advice: str) -> None:
+    """Raises FileExistsError where `run` would not write the scene beside the results in `directory`. advice: what to do
+    where the scene there is another one."""
+    _SceneFile(scene, directory).demand_place(replace, advice)
 
 
 def _follow(words: list[str], directory: Path, report: Progress) -> tuple[int, str]:

@@ -21,6 +21,9 @@ from .scene import Scene, SceneError
 SUMMARY = {"steps": np.int64, "time": np.float64, "unconverged_steps": np.int64, "worst_error_rms": np.float64,
            "worst_balance": np.float64, "worst_overlap": np.float64, "iterations": np.int64, "wall_s": np.float64}
 
+# Further columns of the table.
+RUN_COLUMNS = ("directory", "exit_code", "digest")
+
 Measure = Callable[[Run], float]
 
 
@@ -96,7 +99,7 @@ def sweep(
     {"peak": lambda run: run.triaxial["q_over_p"].max()}. The table is also written to out/sweep.csv.
 
     All scenes are checked before the first run begins: raises SceneError where one is wrong, ValueError where nothing is
-    varied, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them, or has
+    varied, or a measure has the name of another column, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them, or has
     scenes of other values, or of the user's own, which stay. A run that
     fails does not end the others: its row has the exit code, `errors` the message. What a `measure` raises is raised
     when all runs have ended and the table is written, with NaN in its place.
@@ -106,7 +109,12 @@ def sweep(
     for key, given in {**(keys or {}), **named}.items():
         if isinstance(given, str) or not isinstance(given, Iterable):
             raise TypeError(f"{key}: give a list of values, [{given!r}]")
+    if jobs < 1:
+        raise ValueError(f"jobs must be 1 or more, got {jobs}")
     values = {**(keys or {}), **_full_names(base, named, program)}
+    taken = sorted({*values, *RUN_COLUMNS, *SUMMARY} & set(measure or {}))
+    if taken:
+        raise ValueError(f"measure: the table has a column of its own called {', '.join(taken)}; choose another name")
     points = list(itertools.product(*values.values()))
     if not values or not points:
         raise ValueError("nothing is varied: sweep(scene, out, friction=[0.2, 0.5]) runs twice")
@@ -124,7 +132,8 @@ def sweep(
         raise FileExistsError(f"{there[0]} holds a run: resume=True keeps what is done, force=True runs all anew")
 
     for changed, directory in zip(scenes, directories):
-        demand_place_of_scene(changed, directory, replace=force)
+        demand_place_of_scene(changed, directory, replace=force, advice=(
+            "a sweep of other values was made here; take its values, choose another directory, or force=True runs all anew"))
 
     def one(changed: Scene, directory: Path) -> RunError | None:
         try:

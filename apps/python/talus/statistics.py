@@ -11,17 +11,22 @@ from numpy.typing import ArrayLike
 from .errors import MissingData
 from .frame import Frame
 
+UNIT = 1e-3  # by how much the length of a unit vector may be off: files may have it in single precision
+
 
 def fabric_tensor(normals: ArrayLike) -> np.ndarray:
     """Fabric tensor F_ij = <n_i n_j> over contacts (Satake 1982): symmetric, of trace 1, I/3 where no direction is
     preferred.
 
     normals: unit vectors, shape (m, 3), of either sign; `frame.normals[frame.between_grains]`.
-    Raises ValueError where there is no contact.
+    Raises ValueError where there is no contact, and for normals that are no unit vectors.
     """
     n = np.asarray(normals, dtype=float).reshape(-1, 3)
     if len(n) == 0:
         raise ValueError("the fabric of no contact is not defined")
+    wrong = np.count_nonzero(~(np.abs(np.linalg.norm(n, axis=1) - 1) < UNIT))
+    if wrong:
+        raise ValueError(f"normals: {wrong} of {len(n)} are no unit vectors")
     return n.T @ n / len(n)
 
 
@@ -42,9 +47,11 @@ def force_distribution(forces: ArrayLike, bins: int | ArrayLike = 40) -> tuple[n
 
     forces: magnitudes [N], shape (m,); zeros and negative ones are left out: these contacts carry nothing.
     bins: number of bins between 0 and the largest f, or edges of f [1]. Returns centres of the bins and P, both [1].
-    Raises ValueError where no force is positive.
+    Raises ValueError where no force is positive, or some are no numbers.
     """
     f = np.asarray(forces, dtype=float).ravel()
+    if not np.isfinite(f).all():
+        raise ValueError(f"forces: {np.count_nonzero(~np.isfinite(f))} of {len(f)} are no numbers")
     f = f[f > 0]
     if len(f) == 0:
         raise ValueError("no contact carries a force")
@@ -75,11 +82,16 @@ def pair_correlation(
     Returns the mean radius of each shell [m] and g [1]; time and memory grow as n times the neighbours within r_max.
 
     Raises ValueError where r_max is no distance of this box: more than half of it between two of its faces; for
-    shears between directions that are not both periodic; and for centres that are no numbers.
+    shears between directions that are not both periodic; for corners that are no box; and for centres that are no
+    numbers, or none.
     """
     x, low, high = np.asarray(positions, float).reshape(-1, 3), np.asarray(low, float), np.asarray(high, float)
     if not np.isfinite(x).all():
         raise ValueError(f"positions: those of {np.count_nonzero(~np.isfinite(x).all(axis=1))} grains are no numbers")
+    if len(x) == 0:
+        raise ValueError("positions: there are none")
+    if not (np.isfinite(low).all() and np.isfinite(high).all() and (high > low).all()):
+        raise ValueError(f"low, high: {low} and {high} are no corners of a box")
     size, wraps = high - low, np.broadcast_to(np.asarray(periodic, bool), 3)
     edges_of_cell, pairs = np.diag(size), ((0, 1), (0, 2), (1, 2))
     for (i, j), shear in zip(pairs, np.broadcast_to(np.asarray(shears, float), 3)):

@@ -284,6 +284,24 @@ TEST(CertificateAudit, OfALatticeThatWallsPressByFarMoreThanMovesItIsNotDeceived
   EXPECT_GE(within_their_claims(run), 10);
 }
 
+TEST(CertificateAudit, OfAChainWhoseSlidingTurnsSlowlyIsNotDeceived) {
+  // In step 9 two rounds agreed, each of which had turned sliding by a thousandth of what was missing.
+  const AuditedRun run = audited(make_scene("chain", 71071, {}), 20);
+  EXPECT_GE(within_their_claims(run), 15);
+}
+
+TEST(CertificateAudit, OfAColumnBesideFastGrainsThatTouchItIsOfTheColumnAlone) {
+  // Where contacts that carry nothing counted, 71063 claimed to know what the column lacked of the whole.
+  for (const std::uint64_t seed : {71020U, 71041U, 71063U}) {
+    const AuditedRun run = audited(make_scene("touching", seed, {}), 20);
+    EXPECT_GE(within_their_claims(run), 3) << seed;
+    for (const AuditedStep& step : run.steps)
+      if (step.certified && step.judged == Judged::yes) {
+        EXPECT_LE(step.errors.cluster, 2 * step.claimed) << seed << ", step " << step.step;
+      }
+  }
+}
+
 TEST(CertificateStudy, KnowsWhatItHasNoFormulasFor) {
   const auto known = [](const std::function<void(talus::Setup&)>& change) {
     talus::Setup setup = make_scene("column", 3, {}).scene.setup;

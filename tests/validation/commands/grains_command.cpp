@@ -91,6 +91,14 @@ TEST_F(Grains, ARunThatWasStoppedGoesOnToTheSameBitsAndTables) {
   }
 }
 
+TEST_F(Grains, ThatNeverFallDueAreWarnedOf) {
+  const Outcome outcome = run(replaced(rain, "from = 0.05", "from = 50"), "--out out");
+  EXPECT_EQ(outcome.code, 0) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("insert 'sand' placed no grain, as none was due"), std::string::npos)
+      << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("insert 'glass' placed no grain"), std::string::npos) << outcome.messages;
+}
+
 TEST_F(Grains, WithoutRoomTheRunGoesOnAndSaysSo) {
   const Outcome outcome = run(replaced(rain, "count = 40", "count = 4000"), "--out out");
   EXPECT_EQ(outcome.code, 0) << outcome.messages;
