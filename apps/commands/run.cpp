@@ -108,7 +108,6 @@ void read_recordings(const RunOptions& options, const graph::Communicator& ranks
 
 /// The sample, on rank 0, and the walls that are placed by it.
 void place_sample(Prepared& run) {
-  demand_memory_of_graph(run.scene);
   if (run.scene.from_state()) {
     StateSample state = read_state(run.scene);
     run.sample = build_sample(run.scene, std::move(state.sample));
@@ -216,6 +215,7 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
     if (ranks.rank() != 0) return;
     for (const std::string& file : io::input_files(run.scene))
       run.input_files.push_back({file, io::crc_of_file(file)});
+    demand_memory_of_graph(run.scene, ranks.ranks());
     if (run.point) return;
     place_sample(run);
     // scene.resolved.toml says where the walls stood

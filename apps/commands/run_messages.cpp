@@ -132,9 +132,10 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
   for (const InsertReport& insert : simulation.inserted()) {
     terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
                  counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
-    if (insert.placed == 0 && insert.no_room == 0)
+    if (simulation.finished() && insert.placed == 0 && insert.no_room == 0)
       terminal.warn(
-          "warning: insert '{}' placed no grain, as none was due: its `stage`, `from` and `until` leave it no "
+          "warning: insert '{}' placed no grain, as none was due: its `stage`, `from` and `until` leave it "
+          "no "
           "time in this run, or its rate is too low",
           insert.name);
     if (insert.no_room > 0 && insert.waiting > 0)
@@ -253,8 +254,8 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "
-        "change in them in a step, at worst (`velocity_error` in steps.csv); "
-        "solver.velocity_tolerance bounds it",
+        "change in them in a step, with friction of the largest wall force if that is less, at worst "
+        "(`velocity_error` in steps.csv); solver.velocity_tolerance bounds it",
         summary.worst_velocity_error);
   terminal.say("results in {}", directory);
 }

@@ -105,7 +105,9 @@ HtmlSections certificate_section(const RunFolder& run) {
         run,
         {"Error of velocities", "error, velocities", "velocity_error", velocity_allowed(run),
          "In clusters of contacts that are too large for a direct solve: estimated momentum of the errors "
-         "of velocities, over what these contacts exchange."}));
+         "of velocities, over what these contacts exchange; with friction over the largest impulse of a "
+         "wall, if "
+         "that is less."}));
   return {section};
 }
 

@@ -15,8 +15,9 @@ namespace talus {
 /// base, std::runtime_error when a signal asks to stop (signals.hpp).
 Sample build_sample(const io::Scene& scene, std::optional<Sample> state = std::nullopt);
 
-/// Throws io::SceneError when this machine has no memory for the graph of a step of so many subdomains.
-void demand_memory_of_graph(const io::Scene& scene);
+/// Throws io::SceneError when this machine has no memory for one rank's part of the graph of a step of so
+/// many subdomains.
+void demand_memory_of_graph(const io::Scene& scene, int ranks);
 
 /// Where materials have names: gives the grains that have none that of a sample of the scene, and all their
 /// densities.

@@ -18,7 +18,8 @@ constexpr std::array all_measures = {
             true, true},
     Measure{"cf", "largest error of a contact's force over the largest contact force",
             &TrueErrors::contact_force, true, true},
-    Measure{"cluster", "V of the connected cluster where it is largest", &TrueErrors::cluster, true, false},
+    Measure{"cluster", "V of the bodies that push one another, where it is largest", &TrueErrors::cluster,
+            true, false},
     Measure{"energy", "energy gained that nothing supplied, over the kinetic energy without contacts",
             &TrueErrors::energy, false, false}};
 

@@ -62,8 +62,8 @@ struct Reference {
 };
 
 /// Per grain, then per wall, then of the cell: a number that those have in common which contacts join, of
-/// which joins(c) is true. Driven and fixed walls join nothing; a cell that follows a stress is joined by all
-/// contacts between grains.
+/// which joins(c) is true. Driven and fixed walls join nothing; a cell that follows a stress is joined by
+/// those between grains.
 std::vector<std::size_t> joined_bodies(const StepProblem& problem,
                                        const std::function<bool(std::size_t)>& joins);
 

@@ -19,6 +19,8 @@ struct Floors {
   double contact = 1e-3;    ///< likewise: least contact impulse
   double load = 1e-2;       ///< of a cluster's weight in a step: least momentum it exchanges
   double cluster = 1e-3;    ///< of a cluster's own momentum, likewise: grains that graze one another
+  double elsewhere = 1e-6;  ///< of what all exchange, by the cluster's share of the mass (docs/theory.md):
+                            ///< less is what the end of an earlier motion has left of it
   double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
@@ -132,10 +134,12 @@ std::vector<double> cluster_masses(const StepProblem& problem) {
 
 /// Of the bodies that push one another, in the exact answer or as the run says, where the momentum error is
 /// largest against what they exchange. Contacts that carry nothing would hide a column beside what is fast.
-double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::span<const Vec3> exact,
+double worst_cluster(const StepProblem& problem, const Momenta& momentum, const Reference& reference,
                      std::span<const Vec3> run) {
-  const std::vector<std::size_t> set = joined_bodies(
-      problem, [&](std::size_t c) { return exact[c] != Vec3::Zero() || run[c] != Vec3::Zero(); });
+  const std::vector<Vec3>& exact = reference.r;
+  const std::vector<std::size_t> set = joined_bodies(problem, [&](std::size_t c) {
+    return exact[c] != Vec3::Zero() || reference.exact[c] != Vec3::Zero() || run[c] != Vec3::Zero();
+  });
   struct Sums {
     double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0, drive = 0;
   };
@@ -162,13 +166,17 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
       add(grains + contact.wall());
     if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
     if (contact.at_wall()) own.wall_impulse = std::max(own.wall_impulse, exact[c].norm());
-    if (exact[c] != Vec3::Zero()) own.drive = std::max(own.drive, drive_at(problem, contact));
+    if (exact[c] != Vec3::Zero() || run[c] != Vec3::Zero())
+      own.drive = std::max(own.drive, drive_at(problem, contact));
   }
   double worst = 0;
   const double weight = problem.time_step * problem.gravity.norm();
+  const double elsewhere = floors.elsewhere * momentum.all_exchanged() /
+                           std::accumulate(problem.mass.begin(), problem.mass.end(), 1e-300);
   for (const Sums& own : sums) {
     const double unit = std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * own.drive,
-                                  floors.load * own.mass * weight, floors.cluster * own.momentum, 1e-300});
+                                  floors.load * own.mass * weight, floors.cluster * own.momentum,
+                                  own.mass * elsewhere, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;
@@ -209,7 +217,7 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);
   errors.contact_force = contact_wrong / std::max(contact_unit, floors.contact * exchange);
-  errors.cluster = worst_cluster(problem, momentum, reference.r, end.r);
+  errors.cluster = worst_cluster(problem, momentum, reference, end.r);
   return errors;
 }
 

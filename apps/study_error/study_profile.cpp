@@ -80,8 +80,8 @@ void study_profile(const fs::path& folder, const ProfilePlan& plan,
                         row.problem, row.method, tolerance, row.converged ? "solved" : "NOT solved",
                         row.seconds, row.error));
         rows.push_back({tolerance, std::move(row)});
-        keep();
       }
+    keep();
   }
   if (rows.empty()) throw io::FileError(folder.string(), "holds no problem that can be read");
 }

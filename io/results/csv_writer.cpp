@@ -77,7 +77,8 @@ constexpr Column<StepReport> steps_columns[] = {
      "estimated error of forces on walls, heavy bodies and cuts, or momentum defect, if larger",
      [](std::string& t, const auto& r) { put(t, r.balance); }},
     {"velocity_error", "1",
-     "estimated error of velocities in clusters that no direct solve takes, over what these exchange",
+     "estimated error of velocities in clusters that no direct solve takes, over what these exchange, with "
+     "friction over the largest impulse of a wall if that is less",
      [](std::string& t, const auto& r) { put(t, r.velocity_error); }},
     {"jump", "1", "interface jump of velocities; 0 with one subdomain",
      [](std::string& t, const auto& r) { put(t, r.jump); }},

@@ -273,7 +273,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   double least = std::numeric_limits<double>::infinity();
   const int most = friction ? thresholds.most_sliding_rounds : thresholds.most_rounds;
   int rounds = 0;
-  double at_first = 0, moved_before = std::numeric_limits<double>::infinity();
+  double at_first = 0, moved = std::numeric_limits<double>::infinity();
   for (int since = 0; rounds < most && since < thresholds.patience; ++since) {
     ++rounds;
     Correction now;
@@ -284,16 +284,17 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     now.found = momentum_of(problem, motion);
     const std::vector<ContactState> then = set.state;
     now.open = see_states(problem, motion, set);
-    const double moved = momentum_of(problem, added(motion, -1, before));
-    now.moved = larger(moved, rest_of(moved_before, moved, now.left));
-    moved_before = moved;
+    now.moved = momentum_of(problem, added(motion, -1, before));
+    // Of further rounds: the direction of sliding may lag by the same small part in each.
+    const double to_come = rest_of(moved, now.moved, now.left);
+    moved = now.moved;
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
     const bool stays = friction ? set.state == then : stand(problem, then, thresholds.rounding, set);
     if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);
     now.settled = now.open <= goal && now.left <= enough && converged(problem, now, goal, thresholds) &&
-                  (friction ? rounds > 1 && now.moved <= goal : stays);
+                  (friction ? rounds > 1 && larger(now.moved, to_come) <= goal : stays);
     if (now.settled || now.error() < least) {
       least = now.error();
       best = std::move(now);

@@ -72,16 +72,15 @@ struct Correction {
   double open = 0;            ///< what the natural map still finds wrong behind the last round [N s]
   double left = 0;            ///< what rounding may leave of the linear system [N s]
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
-  double moved = 0;  ///< momentum by which the last round has changed the motion, or further ones will by the
-                     ///< ratio of the last two, if that is more [N s]
-  double updated = 0;  ///< likewise the last update of the multipliers
-  double coming = 0;   ///< and what further ones would add, by the ratio of the last two [N s]
-  double pushed = 0;   ///< by which that, or the last proximal step, has changed an impulse, over the
-                       ///< largest impulse, at most
+  double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
+  double updated = 0;         ///< likewise the last update of the multipliers
+  double coming = 0;          ///< and what further ones would add, by the ratio of the last two [N s]
+  double pushed = 0;  ///< part of the largest impulse by which the last update, or the last proximal step,
+                      ///< has changed an impulse, at most
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
-                         ///< changed next to nothing; and rounding leaves less than need not be known. Of
-                         ///< proximal steps: further ones would change next to nothing
+                         ///< changed next to nothing, and so will further ones; and rounding leaves less than
+                         ///< need not be known. Of proximal steps: further ones would change next to nothing
   bool stuck = false;  ///< proximal steps went on without moving or mending anything (SearchThresholds::idle)
 
   /// All of it [N s].
@@ -121,8 +120,8 @@ double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::
 /// What may be left of a correction that has found so much momentum [N s].
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds);
 
-/// What is still to come of proximal steps that have changed the motion by `before` and by `now` at last: a
-/// geometric series. What is within `rounding` tells nothing of its ratio [all N s].
+/// What is still to come of steps, rounds or updates that have changed the motion by `before` and by `now` at
+/// last: a geometric series. What is within `rounding` tells nothing of its ratio [all N s].
 double rest_of(double before, double now, double rounding);
 
 }  // namespace talus

@@ -12,14 +12,16 @@
 
 namespace talus {
 
-/// A part of a cluster as a problem of its own.
+/// A part of a cluster as a problem of its own, which is answered as a cluster is: bodies that push one
+/// another, or one that nothing pushes.
 struct LoadedGroup {
   BodyProblem problem;                ///< levers are the cluster's
   std::vector<std::size_t> bodies;    ///< per unknown: its number in the cluster, ascending
   std::vector<std::size_t> contacts;  ///< per contact, likewise
 };
 
-/// The contacts that carry something: 1, else 0. In a cell that follows a stress all do, as each moves it.
+/// The contacts that carry something, however little: 1, else 0; grains that cohesion holds do. In a cell
+/// that follows a stress all do, as each moves it.
 std::vector<char> carrying(const BodyProblem& cluster);
 
 /// Bodies that the contacts of which `joins` is 1 connect, in order of their lowest ones, with all contacts

@@ -180,7 +180,7 @@ void join_by_whole(const BodyProblem& cluster, const std::vector<AnsweredGroup>&
     if (cluster.impulse[k] + whole.answer.found[k] != Vec3::Zero()) joins[k] = 1;
 }
 
-/// The answers to a cluster's groups, such that no contact between them closes.
+/// The answers to a cluster's groups, such that no contact between two closes by more than may be.
 std::vector<AnsweredGroup> answered_groups(const BodyProblem& cluster, const Everywhere& everywhere,
                                            const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
   std::vector<char> joins = carrying(cluster);

@@ -1,8 +1,8 @@
 #pragma once
 
-/// The error of a step in velocities, wall forces and contact forces, per cluster of contacts: what the
-/// residual of one contact cannot tell, in wedges, chains, arches and under heavy bodies
-/// (docs/decisions/0024-certificate.md).
+/// The error of a step in velocities, wall forces and contact forces, per group: bodies of a cluster that
+/// push one another (loaded_groups.hpp). It is what the residual of one contact cannot tell, in wedges,
+/// chains, arches and under heavy bodies (docs/decisions/0024-certificate.md).
 
 #include <span>
 
@@ -22,9 +22,10 @@ struct StepErrorThresholds {
   /// impulses of its contacts, too. What happens elsewhere in a step must not hide that a column at rest
   /// falls: a ball that hits the floor beside it at 5 m/s does 5000 times as much, per mass.
   double elsewhere = 1e-6;
-  /// Contacts that carry nothing part a cluster into groups, unless under the answers of these they close with
-  /// more than this part, in (0, 1), of what need not be told apart. Behind so many rounds of joining those
-  /// that do, >= 1, what an answer of the whole cluster has carry joins, too, and behind twice as many all.
+  /// Contacts without an impulse part a cluster into groups, unless under the answers of these they close
+  /// with more than this part, in (0, 1), of what need not be told apart. In the so-many-th round of joining
+  /// those that do, >= 1, what an answer of the whole cluster has carry joins, too, and in round twice that
+  /// number all. Groups that have changed are answered anew in each round, each with its own budget.
   double closing = 1e-2;
   int most_rounds = 4;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
@@ -36,10 +37,10 @@ struct StepErrorThresholds {
 
 /// Distance of what the impulses of a step give from a solution of it, relative.
 struct StepError {
-  double velocity = 0;  ///< of the worst cluster: sum m |V(r) - V*| over its scale
+  double velocity = 0;  ///< of the worst group: sum m |V(r) - V*| over its scale
   double wall = 0;     ///< of the worst wall: its impulse, over the largest impulse of a wall; the faces of a
                        ///< cell are walls
-  double contact = 0;  ///< of the worst contact: its impulse, over the largest of its cluster
+  double contact = 0;  ///< of the worst contact: its impulse, over the largest of its group
   PartImpulses change;  ///< of r, per part and contact, that mends it as far as answers help [N s]
   bool mends = false;   ///< of clusters that are wrong by more than what is asked for it mends some
   bool solved = true;   ///< of all of those an answer was found
@@ -63,12 +64,12 @@ struct ErrorGoal {
   Vec3 faces = Vec3::Zero();
 };
 
-/// The distance to an answer of every cluster (cluster_solver.hpp), all of which must be small. Without
+/// The distance to an answer of every group (cluster_solver.hpp); the clusters must be small. Without
 /// friction velocities are unique, and this is their error but for rounding. With friction they may not be:
 /// there it is the distance to one of the solutions, and that to the nearest is no larger. Where no answer is
 /// found the error is not known, and at least StepErrorThresholds::unknown. Collective.
 ///
-/// The scale of a cluster is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
+/// The scale of a group is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
 /// it; or the speed of driven walls times its mass, if that is more; where no wall is driven, at least a
 /// hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed at rest gain
 /// nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters do, by its

@@ -236,14 +236,15 @@ double Certificate::claimed(double error, WholeProblem& whole) {
   if (!scales_.friction) return error;
   const double told = whole.velocity_errors().reuse().told_sliding * relative_work(whole);
   if (settings_.velocity_tolerance > 0) return larger(error, told);
-  return larger(error, std::min(told * std::max(1.0, exchanged_over_walls()), velocity_tolerance()));
+  return larger(error, std::min(told * exchanged_over_walls(), velocity_tolerance()));
 }
 
-/// Momentum that contacts of large clusters exchange, at most (Cauchy and Schwarz), over the largest impulse
-/// of a wall.
+/// Momentum that contacts of large clusters exchange, about (for grains at most, by Cauchy and Schwarz), over
+/// the largest impulse of a wall; 1 where that is more, or no wall is pressed.
 double Certificate::exchanged_over_walls() const {
-  const double mass = std::max(0.0, exchanged_.mass - exchanged_by_small_.mass), walls = wall_scale();
-  return walls > 0 ? std::sqrt(2 * mass * exchanged_by_large().counts()) / walls : 0;
+  const double mass = std::max(0.0, exchanged_.mass - exchanged_by_small_.mass);
+  const double ratio = std::sqrt(2 * mass * exchanged_by_large().counts()) / wall_scale();
+  return std::isfinite(ratio) ? std::max(1.0, ratio) : 1;
 }
 
 /// The energy that the contacts of large clusters exchange, of grains and walls of finite mass [J]. No less

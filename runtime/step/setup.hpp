@@ -167,8 +167,8 @@ struct SolverSettings {
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
   /// On velocity_error, of clusters that no direct solve takes; 0: balance_tolerance, with friction
-  /// sliding_over_balance times that, at most 1, as what is wrong by all that is exchanged says nothing
-  /// (docs/decisions/0030-work-of-errors.md).
+  /// sliding_over_balance times that, at most 1, as what is wrong by all that is exchanged says nothing, or
+  /// balance_tolerance, if that is more (docs/decisions/0030-work-of-errors.md).
   double velocity_tolerance = 0;
   static constexpr double sliding_over_balance = 10;
   double velocity_allowed(bool friction) const {

@@ -7,8 +7,8 @@ namespace talus {
 
 namespace {
 
-/// Sums of the parts of steps may fall short of 1 by their rounding.
-constexpr double whole = 1 - 1e-9;
+/// Sums of what steps add may fall short of 1 by their rounding.
+constexpr double nearly_whole = 1 - 1e-9;
 
 /// Part of a window of the steady state that a step takes.
 double part_of_window(const StageEnd& end, const StageStep& step) {
@@ -29,7 +29,7 @@ void StageMemory::add(const StageEnd& end, const StageStep& step) {
   weight += step.time_step;
   sums[0] += step.time_step * step.stress_ratio;
   sums[1] += step.time_step * step.solid_fraction;
-  if (window < whole) return;
+  if (window < nearly_whole) return;
   window = 0;
   // Without a stress in any step, as before grains meet, nothing is said of a steady state.
   if (sums[0] == 0) {
@@ -61,7 +61,7 @@ StageDone stage_done(const Stage& stage, const StageProgress& progress) {
                                              : steps / steps_in(*end.time, stage.time_step));
   if (progress.steps == 0) return nearest;
   const auto consider_path = [&](const char* by, double fraction) {
-    consider(by, fraction >= whole ? std::max(fraction, 1.0) : fraction);
+    consider(by, fraction >= nearly_whole ? std::max(fraction, 1.0) : fraction);
   };
   if (end.strain) consider_path("strain", std::abs(progress.strain) / *end.strain);
   if (end.shear_strain) consider_path("shear_strain", progress.sheared / *end.shear_strain);

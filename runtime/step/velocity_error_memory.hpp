@@ -18,9 +18,10 @@ struct VelocityErrorReuse {
   /// knows less of them. In the shear of the demo checks find 0.1 to 0.3; in flat vaults, where 0.2 to 0.6
   /// would be right, a hundredth.
   double least_sliding = 0.3;
-  /// So many times the work with friction an error is told to be, as far as the tolerance goes unless the
-  /// user has set it, >= `least_sliding`: no step is missed for it, but of 110 certified steps of beds on a
-  /// belt and on a floor that turns, 3 were wrong by more than twice their work, the worst by 2.9.
+  /// So many times the work with friction an error is told to be (of wall forces, too: Certificate), as far
+  /// as the tolerance goes unless the user has set it, >= `least_sliding`: no step is missed for it, but of
+  /// 110 certified steps of beds on a belt and on a floor that turns, 3 were wrong by more than twice their
+  /// work, the worst by 2.9.
   double told_sliding = 2;
   /// What was found is used while the number of contacts changes by at most this fraction, one in so many, >=
   /// 1, and the energy that they exchange by at most this factor, > 1.

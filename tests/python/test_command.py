@@ -209,7 +209,7 @@ def test_a_sweep_is_a_product_with_a_table(heap, tmp_path):
                     measure={"a": lambda run: run.no_such_table, "grains": lambda run: len(run.frame(-1).ids)})
     assert talus.read_table(tmp_path / "sweep" / "sweep.csv")["grains"].tolist() == [60] * 4
     written = (tmp_path / "sweep" / "sweep.csv").read_bytes()
-    with pytest.raises(FileExistsError, match="a sweep of other values"):
+    with pytest.raises(FileExistsError, match="a sweep of other values, or of another scene"):
         talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.2, 0.6], resume=True)
     assert (tmp_path / "sweep" / "sweep.csv").read_bytes() == written
 

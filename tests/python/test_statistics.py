@@ -113,7 +113,7 @@ def test_corners_that_are_no_box_are_refused():
 
 
 def test_forces_and_normals_that_are_no_numbers_are_refused():
-    with pytest.raises(ValueError, match="1 of 3 are no numbers"):
+    with pytest.raises(ValueError, match="1 of 3 are not finite"):
         talus.force_distribution([1, np.nan, 2])
     for normals in ([[1, 0, 0], [np.nan, 0, 0]], [[1, 0, 0], [2, 0, 0]]):
         with pytest.raises(ValueError, match="1 of 2 are no unit vectors"):

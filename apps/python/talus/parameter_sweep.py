@@ -21,7 +21,7 @@ from .scene import Scene, SceneError
 SUMMARY = {"steps": np.int64, "time": np.float64, "unconverged_steps": np.int64, "worst_error_rms": np.float64,
            "worst_balance": np.float64, "worst_overlap": np.float64, "iterations": np.int64, "wall_s": np.float64}
 
-# Further columns of the table.
+# What the table has of a run besides.
 RUN_COLUMNS = ("directory", "exit_code", "digest")
 
 Measure = Callable[[Run], float]
@@ -133,7 +133,7 @@ def sweep(
 
     for changed, directory in zip(scenes, directories):
         demand_place_of_scene(changed, directory, replace=force, advice=(
-            "a sweep of other values was made here; take its values, choose another directory, or force=True runs all anew"))
+            "a sweep of other values, or of another scene, was made here; take its values, choose another directory, or force=True runs all anew"))
 
     def one(changed: Scene, directory: Path) -> RunError | None:
         try:
@@ -143,7 +143,7 @@ def sweep(
             return error
         return None
 
-    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+    with ThreadPoolExecutor(jobs) as pool:
         errors = list(pool.map(one, scenes, directories))
     failed: list[Exception] = []
 

@@ -47,11 +47,11 @@ def force_distribution(forces: ArrayLike, bins: int | ArrayLike = 40) -> tuple[n
 
     forces: magnitudes [N], shape (m,); zeros and negative ones are left out: these contacts carry nothing.
     bins: number of bins between 0 and the largest f, or edges of f [1]. Returns centres of the bins and P, both [1].
-    Raises ValueError where no force is positive, or some are no numbers.
+    Raises ValueError where no force is positive, or some are not finite.
     """
     f = np.asarray(forces, dtype=float).ravel()
     if not np.isfinite(f).all():
-        raise ValueError(f"forces: {np.count_nonzero(~np.isfinite(f))} of {len(f)} are no numbers")
+        raise ValueError(f"forces: {np.count_nonzero(~np.isfinite(f))} of {len(f)} are not finite")
     f = f[f > 0]
     if len(f) == 0:
         raise ValueError("no contact carries a force")

@@ -57,7 +57,9 @@ Section<SolverSettings> solver_keys() {
               "Bound on the estimated error of the velocities in clusters of contacts that are "
               "too large for a direct solve, over what these exchange (velocity_error).",
               &SolverSettings::velocity_tolerance)
-              .or_auto(0, "`balance_tolerance`; in stages with friction ten times that, but at most 1"),
+              .or_auto(0,
+                       "`balance_tolerance`; in stages with friction ten times that, but at most 1 unless it "
+                       "is more itself"),
           key<SolverSettings>("direct_bodies", "", {.low = 0, .high = 5000},
                               "Clusters of contacts with more bodies are judged by estimates alone. Of what "
                               "this allows, those of up to 200 bodies (500 without friction, long chains "

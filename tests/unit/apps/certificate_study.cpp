@@ -291,7 +291,7 @@ TEST(CertificateAudit, OfAChainWhoseSlidingTurnsSlowlyIsNotDeceived) {
 }
 
 TEST(CertificateAudit, OfAColumnBesideFastGrainsThatTouchItIsOfTheColumnAlone) {
-  // Where contacts that carry nothing counted, 71063 claimed to know what the column lacked of the whole.
+  // Contacts that carry nothing joined the column to the grains that collide.
   for (const std::uint64_t seed : {71020U, 71041U, 71063U}) {
     const AuditedRun run = audited(make_scene("touching", seed, {}), 20);
     EXPECT_GE(within_their_claims(run), 3) << seed;

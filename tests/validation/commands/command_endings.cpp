@@ -79,7 +79,6 @@ end = { steps = 5 }
   EXPECT_NE(summary(at("results")).at("message").get<std::string>().find("step 1 "), std::string::npos);
 }
 
-// A folder stands where a file of the run belongs: seen when the run has begun, before its first step.
 // 65535 subdomains of 27 grains took 22 GB until the machine had no more.
 TEST_F(Ending, OfMoreSubdomainsThanMemoryHoldsIsTwo) {
   if (static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE)) > 1e11)
@@ -87,10 +86,12 @@ TEST_F(Ending, OfMoreSubdomainsThanMemoryHoldsIsTwo) {
   write(at("scene.toml"), column_scene);
   const Outcome outcome = run("run scene.toml --set decomposition.subdomains=65535 --out results");
   EXPECT_EQ(outcome.code, 2) << outcome.messages;
-  EXPECT_TRUE(says(outcome, "65535 subdomains takes about 107 GB")) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("65535 subdomains takes about 107 GB"), std::string::npos)
+      << outcome.messages;
   EXPECT_FALSE(fs::exists(at("results")));
 }
 
+// A folder stands where a file of the run belongs: seen when the run has begun, before its first step.
 TEST_F(Ending, BeforeTheFirstStepIsInRunJson) {
   write(at("scene.toml"), column_scene);
   for (const std::string name : {"trace.h5", "results.h5"}) {

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/unit/replaced.hpp"
 #include "tests/validation/commands/command_helpers.hpp"
 
 namespace talus::signals_test {
@@ -87,7 +88,7 @@ TEST_F(Signalled, RunThatPlacesItsGrainsEndsWithNothingWrittenAndNotByWhatAsksFo
 
 // Scenes that were audited were lost when the signal came as the next one's grains were placed.
 TEST_F(Signalled, StudyOfTheCertificateWritesWhatItHasWhereItPlacesGrains) {
-  write(at("a.toml"), pressed_box);
+  write(at("a.toml"), replaced(pressed_box, "count = 400", "count = 100"));
   write(at("b.toml"), long_deposition);
   const int status = run_until(" grains deposited",
                                {"study", "certificate", "--scenes-from", ".", "--out", "study"}, {SIGTERM});

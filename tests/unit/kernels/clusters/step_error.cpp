@@ -94,11 +94,15 @@ TEST(StepError, OfAColumnThatForcesHaveYetToReachIsNotHiddenEither) {
   add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
   problem.impulse.back() = Vec3(0, 0, 5000 * fall);
   add_contact(problem, grain, 59, Vec3::UnitX(), 0);
-  const StepError error = step_error(problem, {.enough = 1e-4});
-  EXPECT_TRUE(error.mends);
-  EXPECT_GT(error.velocity, 1);
-  EXPECT_NEAR(error.contact, 50. / 60, 1e-6);
-  EXPECT_NEAR(error.change[0][0][2], 50 * fall, 1e-6);
+  for (const int most_rounds : {1, 4, 100}) {
+    StepErrorThresholds thresholds;
+    thresholds.most_rounds = most_rounds;
+    const StepError error = step_error(problem, {.enough = 1e-4}, thresholds);
+    EXPECT_TRUE(error.mends) << most_rounds;
+    EXPECT_GT(error.velocity, 1) << most_rounds;
+    EXPECT_NEAR(error.contact, 50. / 60, 1e-6) << most_rounds;
+    EXPECT_NEAR(error.change[0][0][2], 50 * fall, 1e-6) << most_rounds;
+  }
 }
 
 /// Where the answer of one group runs into another, they have one answer together: a grain that lies loosely

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -128,10 +129,10 @@ TEST(Certificate, BoundsVelocitiesMoreLooselyWithFrictionOrAsTheUserSays) {
 // velocities knows little of contacts that slide, and 0.3 of the work was all that was believed.
 TEST(Certificate, ClaimsTwiceTheWorkWithFrictionAsFarAsItsToleranceGoes) {
   const auto claimed = [](double work, bool friction, Verdict expected = Verdict::solved,
-                          double velocity_tolerance = 0) {
+                          double velocity_tolerance = 0, double wall_push = 10) {
     const SolverSettings settings{.balance_tolerance = 0.05, .velocity_tolerance = velocity_tolerance};
     Certificate certificate(settings);
-    certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}, .friction = friction});
+    certificate.begin({.rounding_velocity = 0, .wall_pushes = {wall_push}, .friction = friction});
     KnownProblem problem(1, {0.01});
     certificate.judge(sums_of({0, 1}, 1000), {.iterations = 0}, problem);
     const Verdict verdict =
@@ -144,6 +145,20 @@ TEST(Certificate, ClaimsTwiceTheWorkWithFrictionAsFarAsItsToleranceGoes) {
   EXPECT_DOUBLE_EQ(claimed(0.12, false), 0.012) << "the check knows";
   EXPECT_DOUBLE_EQ(claimed(0.3, true, Verdict::go_on, 0.1), 0.6) << "a bound of the user's is kept";
   EXPECT_DOUBLE_EQ(claimed(0.04, true, Verdict::solved, 0.1), 0.08);
+  // Contacts exchange sqrt(2) N s, by their energy, and the wall gets 1 N s.
+  EXPECT_DOUBLE_EQ(claimed(0.12, true, Verdict::solved, 0, 0), std::sqrt(2.0) * 0.24);
+  EXPECT_DOUBLE_EQ(claimed(0.2, true, Verdict::solved, 0, 0), 0.5) << "no step is missed for it";
+  EXPECT_DOUBLE_EQ(claimed(0.04, true, Verdict::solved, 0.1, 0), 0.08) << "a bound of the user's: velocities";
+  EXPECT_DOUBLE_EQ(claimed(0.12, false, Verdict::solved, 0, 0), 0.012);
+}
+
+TEST(Certificate, AllowsVelocitiesWithFrictionTenTimesTheBalanceAndNoMoreThanAll) {
+  for (const auto& [balance, allowed] : {std::pair(0.05, 0.5), {0.2, 1.0}, {2.0, 2.0}}) {
+    const SolverSettings settings{.balance_tolerance = balance};
+    EXPECT_DOUBLE_EQ(settings.velocity_allowed(true), allowed);
+    EXPECT_DOUBLE_EQ(settings.velocity_allowed(false), balance);
+  }
+  EXPECT_EQ((SolverSettings{.velocity_tolerance = 3}.velocity_allowed(true)), 3);
 }
 
 }  // namespace
