@@ -190,9 +190,16 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   const std::vector<Vec3> walls = wall_impulses(problem, reference.r, false),
                           pressed = wall_impulses(problem, reference.r, true);
   double wall_unit = 0, wall_wrong = 0;
+  // A wall, and a contact in a row, are passed on what rounding makes of the velocities of all grains beyond.
+  const std::vector<double> together = cluster_masses(problem);
+  std::vector<double> resting(walls.size(), 0.0);
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c)
+    if (const StepContact& contact = problem.contacts[c]; contact.at_wall())
+      resting[contact.wall()] = std::max(resting[contact.wall()], together[c]);
   for (std::size_t w = 0; w < walls.size(); ++w) {
     wall_unit = std::max({wall_unit, pressed[w].norm(), h * std::abs(problem.wall_load[w])});
-    wall_wrong = std::max(wall_wrong, (walls[w] - h * end.after.walls[w].force).norm());
+    const double error = (walls[w] - h * end.after.walls[w].force).norm();
+    wall_wrong = std::max(wall_wrong, beyond_rounding(problem, resting[w], error, floors.rounding));
   }
   const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
   const double load = h * problem.cell.load.cwiseAbs().maxCoeff();
@@ -206,8 +213,6 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   }
   const double exchange = std::max({momentum.all_exchanged(), floors.walls * wall_unit,
                                     mass * problem.drive_speed, floors.motion * mass * speed, 1e-300});
-  // A contact in a row passes on what rounding makes of the velocities of all grains beyond it.
-  const std::vector<double> together = cluster_masses(problem);
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     contact_unit = std::max(contact_unit, reference.r[c].norm());
     contact_wrong =

@@ -291,13 +291,15 @@ TEST(CertificateAudit, OfAChainWhoseSlidingTurnsSlowlyIsNotDeceived) {
 }
 
 TEST(CertificateAudit, OfAColumnBesideFastGrainsThatTouchItIsOfTheColumnAlone) {
-  // Contacts that carry nothing joined the column to the grains that collide.
-  for (const std::uint64_t seed : {71020U, 71041U, 71063U}) {
+  // Where contacts that carry nothing joined them, velocities of the column were wrong by 833, 462 and 428
+  // times the claim in the first step of 70121, 70156 and 70080, and the floor's force by 1000 times in
+  // 70103.
+  for (const std::uint64_t seed : {70121U, 70156U, 70080U, 70103U}) {
     const AuditedRun run = audited(make_scene("touching", seed, {}), 20);
-    EXPECT_GE(within_their_claims(run), 3) << seed;
+    EXPECT_GE(within_their_claims(run), 10) << seed;
     for (const AuditedStep& step : run.steps)
       if (step.certified && step.judged == Judged::yes) {
-        EXPECT_LE(step.errors.cluster, 2 * step.claimed) << seed << ", step " << step.step;
+        EXPECT_LT(step.errors.cluster, step.claimed) << seed << ", step " << step.step;
       }
   }
 }
