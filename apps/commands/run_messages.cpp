@@ -135,8 +135,7 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
     if (simulation.finished() && insert.placed == 0 && insert.no_room == 0)
       terminal.warn(
           "warning: insert '{}' placed no grain, as none was due: its `stage`, `from` and `until` leave it "
-          "no "
-          "time in this run, or its rate is too low",
+          "no time in this run, or its rate is too low",
           insert.name);
     if (insert.no_room > 0 && insert.waiting > 0)
       terminal.warn(

@@ -201,8 +201,7 @@ struct Overlaps {
 }  // namespace
 
 void demand_memory_of_graph(const io::Scene& scene, int ranks) {
-  // Tasks of a subdomain wait for those of all. Measured on one rank: 8000 subdomains take 1.56 GB, 4000
-  // 0.42.
+  // Tasks of a subdomain wait for those of all. On one rank 8000 subdomains took 1.56 GB, 4000 took 0.42.
   constexpr double bytes_of_pair = 25;
   const double subdomains = scene.setup.decomposition.subdomains, there = bytes_there();
   const double needed = bytes_of_pair * subdomains * subdomains / ranks;

@@ -171,6 +171,15 @@ void make_heavy(SceneBench& bench) {
   bench.drop(base * draws.between(0.3, 0.7), base * draws.between(0.3, 0.7), big, 0);
 }
 
+namespace {
+
+/// It would be in the way of grains that are added above.
+void remove_lid(SceneBench& bench) {
+  std::erase_if(bench.made.scene.setup.walls, [](const Wall& wall) { return wall.name == "z+"; });
+}
+
+}  // namespace
+
 void make_apart(SceneBench& bench) {
   Draws& draws = bench.draws;
   const double kind = draws.unit();
@@ -182,8 +191,7 @@ void make_apart(SceneBench& bench) {
     make_rows(bench);
   const double r = bench.radius * draws.between_decades(0.5, 30);
   const Vec3 u(bench.speed_of_fall() * draws.between_decades(0.1, 1e3), 0, 0);
-  std::vector<Wall>& walls = bench.made.scene.setup.walls;
-  std::erase_if(walls, [](const Wall& wall) { return wall.name == "z+"; });  // a lid would be in their way
+  remove_lid(bench);
   const Vec3 above(0, 0, bench.top() + 3 * r);
   bench.add_moving(above - Vec3(r, 0, 0), r, u);
   bench.add_moving(above + Vec3(r, 0, 0), r, -u);
@@ -192,8 +200,7 @@ void make_apart(SceneBench& bench) {
 void make_touching(SceneBench& bench) {
   Draws& draws = bench.draws;
   draws.chance(0.5) ? make_column(bench) : make_among(bench);
-  std::vector<Wall>& walls = bench.made.scene.setup.walls;
-  std::erase_if(walls, [](const Wall& wall) { return wall.name == "z+"; });  // a lid would be in their way
+  remove_lid(bench);
   const auto& grains = bench.made.grains;
   std::size_t top = 0;
   for (std::size_t k = 1; k < grains.x.size(); ++k)
