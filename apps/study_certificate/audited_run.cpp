@@ -136,7 +136,8 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
                             bodies,
                             scene.setup,
                             start.stage_index,
-                            start.before.time - stage_began};
+                            start.before.time - stage_began,
+                            &after};
       const StepProblem problem = rebuild_step(input);
       step.shift = unexplained_shift(input, solver.overlap_correction, after);
       judge(problem, start, after, plan.limits, step);

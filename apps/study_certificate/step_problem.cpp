@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <stdexcept>
 #include <unordered_map>
 #include <vector>
@@ -27,6 +28,7 @@ struct Approach {
   double gap;     ///< in the middle of the step [m]
   double v_n;     ///< before the step [m/s]
   double v_free;  ///< at its end without contacts [m/s]
+  bool closed;    ///< the run says that there is none, and it may be rounding
 };
 
 /// Bodies that attract one another touch up to this gap, over the smaller radius.
@@ -35,6 +37,9 @@ constexpr double reach_of_cohesion = 1e-3;
 /// Normals of one contact, in the frame's and in the problem's words, differ by less: 1 - cos.
 constexpr double one_normal = 1e-9;
 
+/// Roundings of the largest coordinate that a gap may be of.
+constexpr double roundings_of_gap = 4;
+
 /// Whether the pair is a contact; then its bias (docs/theory.md, "Gap term and restitution"). `reach` [m] of
 /// cohesion.
 bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double reach, double& bias) {
@@ -42,7 +47,7 @@ bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, 
   bias = std::max(0.0, pair.gap) / numbers.h;
   if (restitution > 0 && std::abs(pair.v_n) > numbers.slow) {
     const bool closes = pair.v_n < 0 && pair.gap + numbers.h * pair.v_free < 0;
-    if (pair.gap <= 0 || (closes && pair.gap < numbers.turning))
+    if (pair.gap <= 0 || pair.closed || (closes && pair.gap < numbers.turning))
       bias = restitution * pair.v_n;
     else if (closes || (restitution >= 1 && pair.gap > reach))
       return false;
@@ -65,6 +70,8 @@ class Builder {
                     ? in_.stage.laws.largest(&PairLaw::restitution)
                     : 0};
     acts_ = h / (1 + numbers_.E);
+    if (in_.after == nullptr) return;
+    for (const auto& [a, b] : in_.after->contact_bodies) carry_.insert({a, b});
   }
 
   StepProblem build() {
@@ -133,6 +140,13 @@ class Builder {
 
   const PairLaw& law(Material a, Material b) const { return in_.stage.laws.between(a, b); }
 
+  /// StepInput::after, of a grain and another body: the other grain's id, or -1 - w of a wall.
+  bool closed_in_run(double gap, std::size_t k, std::int64_t other) const {
+    if (!(gap > 0 && gap <= roundings_of_gap * made_.rounding_speed * numbers_.h)) return false;
+    const std::int64_t id = in_.before.id[k];
+    return carry_.contains({id, other}) || carry_.contains({other, id});
+  }
+
   void meet(std::size_t i, std::size_t j) {
     const StepCell& cell = made_.cell;
     const Vec3 apart = middle_[i] - middle_[j], k = cell.edges_between(apart),
@@ -144,7 +158,8 @@ class Builder {
     const double gap = distance - in_.before.radius[i] - in_.before.radius[j];
     const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
     double bias = 0;
-    if (!meets(numbers_, {gap, v_n, v_n}, pair.restitution, held.reach, bias)) return;
+    const bool closed = closed_in_run(gap, i, in_.before.id[j]);
+    if (!meets(numbers_, {gap, v_n, v_n, closed}, pair.restitution, held.reach, bias)) return;
     const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
     made_.contacts.push_back({i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction, drift,
                               d / cell.length, gap <= held.reach ? acts_ * held.force : 0});
@@ -161,6 +176,7 @@ class Builder {
 
   /// Cohesion is a given force: it belongs to what happens without contacts.
   void pull_together() {
+    made_.unpulled = made_.free;
     for (const StepContact& contact : made_.contacts)
       if (contact.pull > 0) add_impulse(made_, contact, -contact.pull * contact.normal, made_.free);
   }
@@ -216,8 +232,10 @@ class Builder {
       const Vec3 point = middle_[i] - radius * touch.normal;
       Vec3 drift = wall.material_velocity(point, touch.normal);
       const double gap = touch.distance - radius, v_n = touch.normal.dot(apart - drift);
+      const bool closed = closed_in_run(gap, i, -1 - static_cast<std::int64_t>(w));
       double bias = 0;
-      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained)}, pair.restitution, held.reach, bias))
+      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), closed}, pair.restitution, held.reach,
+                 bias))
         continue;
       if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, drift.norm());
       // In a cell the material of a wall goes with the flow, in its plane.
@@ -234,6 +252,7 @@ class Builder {
   StepProblem made_;
   std::vector<Vec3> middle_;
   std::vector<Material> material_;
+  std::set<std::array<std::int64_t, 2>> carry_;  ///< pairs of StepInput::after
 };
 
 }  // namespace

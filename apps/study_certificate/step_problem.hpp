@@ -51,7 +51,8 @@ struct StepProblem {
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
   std::vector<double> mass;           ///< n [kg]
   std::vector<double> spin_mobility;  ///< n, R^2/I [1/kg]; 0 where a grain does not turn
-  Motion free;                        ///< at the end of the step without contacts
+  Motion free;                        ///< at the end of the step without contacts, but as cohesion pulls
+  Motion unpulled;                    ///< and without cohesion
   std::vector<Vec3> wall_normal;      ///< k
   std::vector<double> wall_inv_mass;  ///< k [1/kg]; 0: fixed or driven
   std::vector<double> wall_load;      ///< k [N]
@@ -76,6 +77,9 @@ struct StepInput {
   const Setup& setup;             ///< alert distance, overlap correction, rotation, cell
   std::size_t stage_index = 0;    ///< of `stage` in the setup
   double time = 0;                ///< since the stage began [s]
+  /// If given: which side of nothing a gap of rounding is on, of bodies that carry in it. That decides whether
+  /// bodies that bounce off one another are a contact.
+  const Frame* after = nullptr;
 };
 
 /// Throws std::invalid_argument for what there are no formulas for: clumps, grains that are inserted or

@@ -21,6 +21,7 @@ struct Floors {
   double cluster = 1e-3;    ///< of a cluster's own momentum, likewise: grains that graze one another
   double elsewhere = 1e-6;  ///< of what all exchange, by the cluster's share of the mass (docs/theory.md):
                             ///< less is what the end of an earlier motion has left of it
+  double held = 1e-6;       ///< of what cohesion holds with: least momentum exchanged
   double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
@@ -95,7 +96,8 @@ std::vector<double> roundings(const StepProblem& problem) {
 
 Momenta momenta(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   Momenta found;
-  const Motion &exact = reference.motion, &free = problem.free;
+  // What pulls as hard as it presses exchanges nothing.
+  const Motion &exact = reference.motion, &free = problem.unpulled;
   const std::vector<double> times = roundings(problem);
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
     found.wrong.push_back(beyond_rounding(problem, problem.mass[k],
@@ -141,7 +143,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
     return exact[c] != Vec3::Zero() || reference.exact[c] != Vec3::Zero() || run[c] != Vec3::Zero();
   });
   struct Sums {
-    double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0, drive = 0;
+    double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0, drive = 0, held = 0;
   };
   std::vector<Sums> sums(set.size());
   std::vector<char> seen(momentum.wrong.size(), 0);
@@ -150,6 +152,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
     const StepContact& contact = problem.contacts[c];
     if (!contact.at_wall() && set[contact.first] != set[contact.other()]) continue;
     Sums& own = sums[set[contact.first]];
+    own.held += contact.pull;
     const auto add = [&](std::size_t body) {
       if (seen[body]) return;
       seen[body] = 1;
@@ -157,7 +160,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
       own.exchanged += momentum.exchanged[body];
       if (body >= grains) return;
       own.mass += problem.mass[body];
-      own.momentum += problem.mass[body] * problem.free.u[body].norm();
+      own.momentum += problem.mass[body] * problem.unpulled.u[body].norm();
     };
     add(contact.first);
     if (!contact.at_wall())
@@ -165,7 +168,8 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
     else if (problem.wall_inv_mass[contact.wall()] > 0 && set[grains + contact.wall()] == set[contact.first])
       add(grains + contact.wall());
     if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
-    if (contact.at_wall()) own.wall_impulse = std::max(own.wall_impulse, exact[c].norm());
+    if (contact.at_wall())
+      own.wall_impulse = std::max(own.wall_impulse, (exact[c] - contact.pull * contact.normal).norm());
     if (exact[c] != Vec3::Zero() || run[c] != Vec3::Zero())
       own.drive = std::max(own.drive, drive_at(problem, contact));
   }
@@ -176,7 +180,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
   for (const Sums& own : sums) {
     const double unit = std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * own.drive,
                                   floors.load * own.mass * weight, floors.cluster * own.momentum,
-                                  own.mass * elsewhere, 1e-300});
+                                  own.mass * elsewhere, floors.held * own.held, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;
@@ -189,7 +193,7 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   const double h = problem.time_step;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.r, false),
                           pressed = wall_impulses(problem, reference.r, true);
-  double wall_unit = 0, wall_wrong = 0;
+  double wall_unit = 0, wall_wrong = 0, felt = 0;
   // A wall, and a contact in a row, are passed on what rounding makes of the velocities of all grains beyond.
   const std::vector<double> together = cluster_masses(problem);
   std::vector<double> resting(walls.size(), 0.0);
@@ -198,21 +202,24 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
       resting[contact.wall()] = std::max(resting[contact.wall()], together[c]);
   for (std::size_t w = 0; w < walls.size(); ++w) {
     wall_unit = std::max({wall_unit, pressed[w].norm(), h * std::abs(problem.wall_load[w])});
+    felt = std::max({felt, walls[w].norm(), h * std::abs(problem.wall_load[w])});
     const double error = (walls[w] - h * end.after.walls[w].force).norm();
     wall_wrong = std::max(wall_wrong, beyond_rounding(problem, resting[w], error, floors.rounding));
   }
   const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
   const double load = h * problem.cell.load.cwiseAbs().maxCoeff();
   wall_unit = std::max({wall_unit, faces.colwise().norm().maxCoeff(), load});
+  felt = std::max({felt, faces.colwise().norm().maxCoeff(), load});
   wall_wrong = std::max(wall_wrong, wrong.colwise().norm().maxCoeff());
   const Momenta momentum = momenta(problem, reference, end);
-  double mass = 0, speed = 0, contact_unit = 0, contact_wrong = 0;
+  double mass = 0, speed = 0, held = 0, contact_unit = 0, contact_wrong = 0;
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
     mass += problem.mass[k];
-    speed = std::max(speed, problem.free.u[k].norm());
+    speed = std::max(speed, problem.unpulled.u[k].norm());
   }
-  const double exchange = std::max({momentum.all_exchanged(), floors.walls * wall_unit,
-                                    mass * problem.drive_speed, floors.motion * mass * speed, 1e-300});
+  for (const StepContact& contact : problem.contacts) held += contact.pull;
+  const double exchange = std::max({momentum.all_exchanged(), floors.walls * felt, mass * problem.drive_speed,
+                                    floors.motion * mass * speed, floors.held * held, 1e-300});
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     contact_unit = std::max(contact_unit, reference.r[c].norm());
     contact_wrong =

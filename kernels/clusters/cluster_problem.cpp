@@ -41,7 +41,8 @@ struct Joint {
   ContactEquation equation;  ///< first and second are not set
   Place first, second;
   Vec3 impulse;
-  Levers levers;  ///< of blocks, where the equation points to none
+  RollingPart rolling = {};
+  Levers levers = {};  ///< of blocks, where the equation points to none
   bool block = false;
 };
 
@@ -55,8 +56,12 @@ void add_body(Pieces& to, const BodyUnknown& body, Place place) {
   to.bodies.emplace_back(place, body);
 }
 
+RollingPart rolling_of(const BodyProblem& part, std::size_t k) {
+  return part.rolling.empty() ? RollingPart{} : part.rolling[k];
+}
+
 /// Numbers of a body and of a contact as they travel: enough for a direct solve.
-constexpr std::size_t body_width = 23, contact_width = 42;
+constexpr std::size_t body_width = 23, contact_width = 50;
 
 void write(std::vector<double>& to, const Vec3& v) {
   to.insert(to.end(), v.begin(), v.end());
@@ -81,15 +86,18 @@ void write_body(std::vector<double>& to, std::int32_t cluster, const BodyUnknown
 
 /// `places`: of the contact, of its first and of its second body.
 void write_contact(std::vector<double>& to, std::int32_t cluster, const ContactEquation& c,
-                   const std::array<Place, 3>& places, const Vec3& impulse) {
+                   const std::array<Place, 3>& places, const Vec3& impulse, const RollingPart& rolling) {
   to.push_back(cluster);
   for (const Place& place : places) write(to, place);
-  to.insert(to.end(), {c.mu, c.drive, static_cast<double>(c.wall), static_cast<double>(c.cell),
+  to.insert(to.end(), {c.mu, c.pull, c.drive, static_cast<double>(c.wall), static_cast<double>(c.cell),
                        c.levers == nullptr ? 0.0 : 1.0});
   write(to, c.normal);
   write(to, c.branch);
   write(to, c.offset);
   write(to, impulse);
+  to.push_back(rolling.arm);
+  write(to, rolling.spin);
+  write(to, rolling.moment);
   if (c.levers == nullptr) return;
   write(to, c.levers->first);
   write(to, c.levers->second);
@@ -145,6 +153,7 @@ void read_contact(std::span<const double> row, std::vector<Pieces>& spanning) {
   joint.first = from.place();
   joint.second = from.place();
   joint.equation.mu = from.number();
+  joint.equation.pull = from.number();
   joint.equation.drive = from.number();
   joint.equation.wall = from.integer();
   joint.equation.cell = from.integer();
@@ -153,6 +162,9 @@ void read_contact(std::span<const double> row, std::vector<Pieces>& spanning) {
   joint.equation.branch = from.vector();
   joint.equation.offset = from.vector();
   joint.impulse = from.vector();
+  joint.rolling.arm = from.number();
+  joint.rolling.spin = from.vector();
+  joint.rolling.moment = from.vector();
   if (joint.block) joint.levers = {from.matrix(), from.matrix()};
   to.joints.push_back(std::move(joint));
 }
@@ -176,7 +188,8 @@ std::vector<Pieces> pieces_of_spanning(const BodyParts& parts, const Clusters& c
       if (number < 0) continue;
       const Place second = c.second < 0 ? Place{-1, -1} : places[p][at(c.second)];
       const Place own{parts[p].subdomain, static_cast<std::int32_t>(k)};
-      write_contact(contacts[p], number, c, {own, places[p][at(c.first)], second}, parts[p].impulse[k]);
+      write_contact(contacts[p], number, c, {own, places[p][at(c.first)], second}, parts[p].impulse[k],
+                    rolling_of(parts[p], k));
       contacts[p].resize((contacts[p].size() + contact_width - 1) / contact_width * contact_width, 0.0);
     }
   });
@@ -205,8 +218,7 @@ std::vector<Pieces> pieces_of_part(const BodyParts& parts, const Clusters& clust
                             places[p][at(c.first)],
                             c.second < 0 ? Place{-1, -1} : places[p][at(c.second)],
                             parts[p].impulse[k],
-                            {},
-                            false});
+                            rolling_of(parts[p], k)});
   }
   for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
     if (Pieces* to = own(clusters.of_body[p][b]); to != nullptr && !to->joints.empty())
@@ -231,6 +243,7 @@ ClusterProblem put_together(Pieces pieces) {
     if (!body.wall && !body.cell) ++made.problem.grains;
   }
   made.levers.reserve(pieces.joints.size());
+  const bool rolling = std::ranges::any_of(pieces.joints, [](const Joint& of) { return of.rolling.arm > 0; });
   for (const Joint& joint : pieces.joints) {
     ContactEquation c = joint.equation;
     c.first = unknown.at(joint.first);
@@ -240,6 +253,7 @@ ClusterProblem put_together(Pieces pieces) {
     if (joint.block) c.levers = &made.levers.emplace_back(joint.levers);
     made.problem.contacts.push_back(c);
     made.problem.impulse.push_back(joint.impulse);
+    if (rolling) made.problem.rolling.push_back(joint.rolling);
     made.contacts.push_back(joint.place);
   }
   return made;

@@ -7,6 +7,7 @@
 
 #include "kernels/bodies/larger.hpp"
 #include "kernels/clusters/contact_matrix.hpp"
+#include "kernels/clusters/rolling_contacts.hpp"
 #include "kernels/delassus/delassus_auto.hpp"
 #include "kernels/delassus/delassus_sweeps.hpp"
 #include "kernels/global/natural_map.hpp"
@@ -27,10 +28,11 @@ bool finite(const BodyProblem& problem) {
 
 /// How far impulses are from the law.
 struct LawDefect {
-  double residual2 = 0;  ///< sum of |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)|^2 W_nn over the contacts [J]
+  double residual2 = 0;  ///< sum of |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)|^2 W_nn over the contacts, and of
+                         ///< their moments likewise (rolling_residual2) [J]
   double energy = 0;     ///< dual objective 1/2 |V(r)|_M^2 + r.offset, which the answer makes least without
                          ///< friction [J]
-  double worst = 0;      ///< largest |r - P(...)| W_nn^(1/2) [J^(1/2)]
+  double worst = 0;      ///< largest |r - P(...)| W_nn^(1/2), or that of all moments [J^(1/2)]
   double largest = 0;    ///< |r| W_nn^(1/2), the largest [J^(1/2)]
 };
 LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impulse) {
@@ -48,17 +50,15 @@ LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impuls
     defect.largest = larger(defect.largest, impulse[k].norm() / std::sqrt(map.m));
     defect.energy += c.offset.dot(impulse[k]);
   }
+  const double rolling2 = rolling_residual2(problem, impulse, V);
+  defect.residual2 += rolling2;
+  defect.worst = larger(defect.worst, std::sqrt(rolling2));
   return defect;
 }
 
-/// What the contacts do to the bodies: V(r) - V_free [m/s].
+/// What the contacts do to the bodies, with cohesion and moments: V(r) - V_free [m/s].
 std::vector<Twist> exchanged(const BodyProblem& problem) {
-  std::vector<Twist> change = velocities_of(problem, problem.impulse);
-  for (std::size_t b = 0; b < change.size(); ++b) {
-    change[b].u -= problem.bodies[b].free.u;
-    change[b].w -= problem.bodies[b].free.w;
-  }
-  return change;
+  return added(velocities_of(problem, problem.impulse), -1, free_of_attraction(problem));
 }
 
 bool meets_law(const LawDefect& defect, const ClusterGoal& goal, const ClusterThresholds& thresholds) {
@@ -88,6 +88,7 @@ void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThr
   if (as_good(problem, answer, then, goal, thresholds)) {
     answer.impulse.assign(problem.contacts.size(), Vec3::Zero());
     answer.found = answer.impulse;
+    answer.moment = {};
     return;
   }
   std::vector<Vec3> changed(problem.impulse);
@@ -97,7 +98,10 @@ void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThr
     answer.impulse[k] = changed[k] - problem.impulse[k];
     if (answer.solved) answer.found[k] = answer.impulse[k];
   }
-  const LawDefect now = law_defect(problem, changed);
+  for (std::size_t k = 0; k < answer.moment.size(); ++k)
+    answer.moment[k] = admissible_change(problem, k, changed[k], answer.moment[k]);
+  const LawDefect now = answer.moment.empty() ? law_defect(problem, changed)
+                                              : law_defect(with_moments(problem, answer.moment), changed);
   // Comparisons are false for NaN.
   answer.helps = now.residual2 < then.residual2 || (!has_friction(problem) && now.energy < then.energy);
 }
@@ -107,6 +111,8 @@ void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThr
 ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const Correction& correction) {
   ClusterAnswer answer;
   answer.solved = correction.settled;
+  answer.knows_moments = correction.knows_moments;
+  if (answer.solved) answer.moment = correction.moment;
   const std::vector<Twist> then = velocities_of(from, from.impulse), since = velocities_of(now, now.impulse);
   for (std::size_t k = 0; k < from.contacts.size(); ++k) {
     const Vec3 change = now.impulse[k] - from.impulse[k];
@@ -194,6 +200,14 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
     solve_by_matrix(problem, goal.enough, left, thresholds, answer);
 }
 
+/// Where an answer takes moments as given: what the rounds, which do not, would change in velocities or in an
+/// impulse counts if it is more.
+void take_worse(const Correction& rounds, const std::vector<Vec3>& found, ClusterAnswer& answer) {
+  answer.error = larger(answer.error, rounds.error() + rounds.rest);
+  for (std::size_t k = 0; k < found.size(); ++k)
+    if (!(found[k].norm() <= answer.found[k].norm())) answer.found[k] = found[k];
+}
+
 }  // namespace
 
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
@@ -206,9 +220,13 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
     answer.error = std::numeric_limits<double>::quiet_NaN();
     return answer;
   }
-  answer = answer_of(problem, problem, correction_of(problem, goal.enough, thresholds.correction));
+  const Correction rounds = correction_of(problem, goal.enough, thresholds.correction);
+  answer = answer_of(problem, problem, rounds);
+  const std::vector<Vec3> found = answer.found;
   if (!answer.solved) search(problem, goal, thresholds, answer);
+  const bool estimate = has_rolling(problem) && !(answer.solved && answer.knows_moments);
   admit(problem, goal, thresholds, answer);
+  if (estimate) take_worse(rounds, found, answer);
   return answer;
 }
 

@@ -48,14 +48,16 @@ struct ClusterThresholds {
 /// What a cluster's impulses have to change by. Momenta are sum m |u| + (I/R^2) |w| [N s].
 struct ClusterAnswer {
   std::vector<Vec3> impulse;  ///< per contact: change of r [N s]
+  std::vector<Vec3> moment;   ///< likewise of moments [N m s]; empty where these are as they are to be
   std::vector<Twist> motion;  ///< per unknown: change of V [m/s]
   std::vector<Vec3> found;    ///< per contact: `impulse` where solved; else what the best of the rounds would
                               ///< change, an estimate of what r is off by [N s]
   double error = 0;           ///< momentum of the motion, and what is not known of it [N s]
   bool solved = false;  ///< impulses and velocities satisfy the law but for what is small; impulses that
                         ///< stay, also where others would share forces among redundant contacts
-  bool helps = false;   ///< with the change they are nearer to it than before
-  bool jammed = false;  ///< there is none: none_admissible
+  bool knows_moments = false;  ///< Correction::knows_moments
+  bool helps = false;          ///< with the change they are nearer to it than before
+  bool jammed = false;         ///< there is none: none_admissible
 };
 
 /// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, and there may be an
@@ -63,9 +65,10 @@ struct ClusterAnswer {
 /// proximal_newton.hpp, which without friction ask first for the velocities alone, and end where these are
 /// those of impulses that meet the law; and where these do not either, with what is left of the budget the
 /// solvers that keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again
-/// from there; not where steps of all kinds were stuck (Correction::stuck). All by counted work, so the same
-/// bits come out every time. The changed impulses lie on the cones. Values that are not finite come back as
-/// an error that is not.
+/// from there; not where steps of all kinds were stuck (Correction::stuck). All but the rounds take moments
+/// of rolling resistance as given, and so find no answer where there are any: only what mends impulses. All
+/// by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values that
+/// are not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/larger.hpp"
 #include "kernels/clusters/firm_contacts.hpp"
+#include "kernels/clusters/rolling_contacts.hpp"
 #include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
 
@@ -25,6 +26,8 @@ struct ActiveSet {
   std::vector<double> shift;    ///< mu |v_t| of the last velocities [m/s]
   std::vector<Vec3> change;     ///< of r: known, and the multiplier [N s]
   std::vector<double> wrong;    ///< what the natural map found wrong last [N s]
+  std::vector<Vec3> carried;    ///< what it would have carried [N s]
+  RollingSet rolling;
 
   /// Known part of the change of r: all of it where open, across the direction where sliding.
   Vec3 known(const BodyProblem& problem, std::size_t k) const {
@@ -43,10 +46,11 @@ struct ActiveSet {
 
 ActiveSet empty_set(const BodyProblem& problem) {
   const std::size_t n = problem.contacts.size();
-  ActiveSet set{std::vector(n, ContactState::open), std::vector<Vec3>(n),
-                std::vector(n, Vec3(Vec3::Zero())), std::vector<double>(n, 0.0),
-                std::vector(n, Vec3(Vec3::Zero())), std::vector<double>(n, 0.0)};
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
+  const std::vector<Vec3> none(n, Vec3(Vec3::Zero()));
+  const std::vector<double> nothing(n, 0.0);
+  ActiveSet set{
+      std::vector(n, ContactState::open), none, none, nothing, none, nothing, none, RollingSet(problem, V)};
   for (std::size_t k = 0; k < n; ++k) {
     const ContactEquation& c = problem.contacts[k];
     set.velocity[k] = constrained_velocity(c, V);
@@ -55,8 +59,9 @@ ActiveSet empty_set(const BodyProblem& problem) {
 }
 
 /// States as the natural map sees them behind the motion and the change of impulses so far. Returns what
-/// contacts do wrong until then, sum |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)| [N s].
-double see_states(const BodyProblem& problem, std::span<const Twist> motion, ActiveSet& set) {
+/// contacts do wrong until then, sum |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)| and of moments likewise [N s].
+double see_states(const BodyProblem& problem, double firmness, std::span<const Twist> motion,
+                  ActiveSet& set) {
   double wrong = 0;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
@@ -64,6 +69,7 @@ double see_states(const BodyProblem& problem, std::span<const Twist> motion, Act
     const Vec3 v = set.velocity[k] + constrained(c, relative_velocity(c, motion));
     const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
     set.shift[k] = shift;
+    set.carried[k] = carried;
     set.wrong[k] = (r - carried).norm();
     wrong += set.wrong[k];
     if (carried == Vec3::Zero()) {
@@ -75,17 +81,18 @@ double see_states(const BodyProblem& problem, std::span<const Twist> motion, Act
       set.direction[k] = carried.normalized();
     }
   }
-  return wrong;
+  return wrong + set.rolling.see(firmness, motion, set.carried);
 }
 
 /// The part of a problem whose contacts are not open, for the linear system. `origin`: their places in all.
 struct ActiveProblem {
   BodyProblem problem;
   std::vector<std::size_t> origin;
+  std::vector<MomentSpring> moments;
   std::vector<Levers> levers;  ///< of frictional contacts that slide: they push along the edge of their cones
 };
 
-ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
+ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set, double firmness) {
   ActiveProblem active;
   BodyProblem& problem = active.problem;
   problem.bodies = all.bodies;
@@ -93,6 +100,7 @@ ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
   active.levers.reserve(all.contacts.size());
   for (std::size_t k = 0; k < all.contacts.size(); ++k) {
     if (set.state[k] == ContactState::open) continue;
+    set.rolling.add_springs(k, active.origin.size(), firmness, active.moments);
     active.origin.push_back(k);
     problem.contacts.push_back(all.contacts[k]);
     problem.impulse.push_back(Vec3::Zero());
@@ -141,8 +149,8 @@ class Round {
         set_(set),
         enough_(enough),
         thresholds_(thresholds),
-        active_(active_part(all, set)),
-        firm_(active_.problem, thresholds.firmness) {}
+        active_(active_part(all, set, thresholds.firmness)),
+        firm_(active_.problem, thresholds.firmness, active_.moments) {}
 
   /// The motion; the multipliers go to the set's `change`, what is missed and left to `result`.
   std::vector<Twist> solve(Correction& result) {
@@ -177,6 +185,7 @@ class Round {
       const ContactEquation& c = active_.problem.contacts[a];
       add_force(c, multiplier(a) + firm_.rho(a) * constrained(c, set_.wish(all_, active_.origin[a])), force);
     }
+    set_.rolling.add_force(thresholds_.firmness, force);
     return force;
   }
   Vec3 multiplier(std::size_t a) const {
@@ -188,7 +197,7 @@ class Round {
     const std::vector<Vec3> before = set_.change;
     for (std::size_t k = 0; k < all_.contacts.size(); ++k)
       if (set_.state[k] == ContactState::open) set_.change[k] = -all_.impulse[k];
-    result.missed = 0;
+    result.missed = set_.rolling.take_multipliers(thresholds_.firmness, motion);
     for (std::size_t a = 0; a < active_.origin.size(); ++a) {
       const std::size_t k = active_.origin[a];
       const ContactEquation& c = active_.problem.contacts[a];
@@ -223,7 +232,7 @@ Correction unchanged(const BodyProblem& problem, double at_first) {
   none.motion.resize(problem.bodies.size());
   none.open = none.at_first = at_first;
   none.rounds = 1;
-  none.settled = true;
+  none.settled = none.knows_moments = true;
   return none;
 }
 
@@ -260,10 +269,11 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   const bool friction = has_friction(problem);
   std::vector<Twist> motion(problem.bodies.size());
   ActiveSet set = empty_set(problem);
-  const double wrong = see_states(problem, motion, set);
+  const double wrong = see_states(problem, thresholds.firmness, motion, set);
   const double apart = mass_ratio(problem);
+  const bool rolling = has_rolling(problem);
   if (wrong * apart <= thresholds.certain * enough) return unchanged(problem, wrong * apart);
-  if (const double error = thresholds.of_single_contact * wrong; problem.contacts.size() == 1 &&
+  if (const double error = thresholds.of_single_contact * wrong; problem.contacts.size() == 1 && !rolling &&
                                                                  problem.contacts.front().levers == nullptr &&
                                                                  apart < 2 && error <= enough)
     return unchanged(problem, error);
@@ -271,7 +281,9 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   Correction best = unchanged(problem, std::numeric_limits<double>::infinity());
   best.settled = false;
   double least = std::numeric_limits<double>::infinity();
-  const int most = friction ? thresholds.most_sliding_rounds : thresholds.most_rounds;
+  const int most = rolling    ? thresholds.most_rolling_rounds
+                   : friction ? thresholds.most_sliding_rounds
+                              : thresholds.most_rounds;
   int rounds = 0;
   double at_first = 0, moved = std::numeric_limits<double>::infinity();
   for (int since = 0; rounds < most && since < thresholds.patience; ++since) {
@@ -280,16 +292,21 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     const std::vector<Twist> before =
         std::exchange(motion, Round(problem, set, enough, thresholds).solve(now));
     now.impulse = set.change;
+    now.moment = set.rolling.change();
+    now.knows_moments = true;
     now.motion = motion;
     now.found = momentum_of(problem, motion);
     const std::vector<ContactState> then = set.state;
-    now.open = see_states(problem, motion, set);
+    const RollingSet rolled = set.rolling;
+    now.open = see_states(problem, thresholds.firmness, motion, set);
     now.moved = momentum_of(problem, added(motion, -1, before));
     // Of further rounds: the direction of sliding may lag by the same small part in each.
     const double to_come = rest_of(moved, now.moved, now.left);
     moved = now.moved;
+    now.rest = std::min(to_come, thresholds.creeping * now.moved);
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
-    const bool stays = friction ? set.state == then : stand(problem, then, thresholds.rounding, set);
+    const bool stays = friction ? set.state == then && set.rolling.same_as(rolled)
+                                : stand(problem, then, thresholds.rounding, set);
     if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);

@@ -47,6 +47,11 @@ struct CorrectionThresholds {
   /// With friction, likewise: of 759 answers that they found for grains in heaps and in a drum 721 had come
   /// within four; 1792 more they did not find.
   int most_sliding_rounds = 4;
+  /// Where contacts resist rolling, likewise: moments at their bounds follow the normal impulses a part in
+  /// each. Of 103,000 clusters of a heap 92,800 had come within six, 400 more within twelve.
+  int most_rolling_rounds = 6;
+  /// Rounds that creep, as those of friction may without end, are taken to go on so many times, >> 1.
+  double creeping = 1e3;
   /// Rounds that have not made the error smaller, after which no more follow, >= 1.
   int patience = 3;
 };
@@ -65,18 +70,23 @@ struct ClusterGoal {
 
 /// What would set all contacts right, and how well that is known. Momenta are sum m |u| + (I/R^2) |w|.
 struct Correction {
-  std::vector<Twist> motion;  ///< per unknown: change of V [m/s]
-  std::vector<Vec3> impulse;  ///< per contact: change of r [N s]
-  double found = 0;           ///< momentum of the motion [N s]
-  double missed = 0;          ///< wishes of contacts that the motion does not grant [N s]
-  double open = 0;            ///< what the natural map still finds wrong behind the last round [N s]
-  double left = 0;            ///< what rounding may leave of the linear system [N s]
-  double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
-  double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
-  double updated = 0;         ///< likewise the last update of the multipliers
-  double coming = 0;          ///< and what further ones would add, by the ratio of the last two [N s]
+  std::vector<Twist> motion;   ///< per unknown: change of V [m/s]
+  std::vector<Vec3> impulse;   ///< per contact: change of r [N s]
+  std::vector<Vec3> moment;    ///< likewise of the moments of those that resist rolling [N m s]; empty where
+                               ///< none does, or nothing changes
+  bool knows_moments = false;  ///< these are unknowns, too; else they are taken as given
+  double found = 0;            ///< momentum of the motion [N s]
+  double missed = 0;           ///< wishes of contacts that the motion does not grant [N s]
+  double open = 0;             ///< what the natural map still finds wrong behind the last round [N s]
+  double left = 0;             ///< what rounding may leave of the linear system [N s]
+  double at_first = 0;         ///< what the law and the first round find wrong with the impulses [N s]
+  double moved = 0;            ///< momentum by which the last round has changed the motion [N s]
+  double updated = 0;          ///< likewise the last update of the multipliers
+  double coming = 0;           ///< and what further ones would add, by the ratio of the last two [N s]
   double pushed = 0;  ///< part of the largest impulse by which the last update, or the last proximal step,
                       ///< has changed an impulse, at most
+  double rest = 0;    ///< what further rounds would add, by the ratio of the last two, or so many like the
+                      ///< last (CorrectionThresholds::creeping) [N s]
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
                          ///< changed next to nothing, and so will further ones; and rounding leaves less than
@@ -104,7 +114,8 @@ struct Correction {
 /// change satisfy all its conditions. A contact that would change by next to nothing is given another round:
 /// in a lattice whose contacts lean by 10^-3 a closing speed of 10^-9 m/s decides who carries. With friction
 /// the direction of sliding is that of the last velocities: there two rounds have to agree in any case; where
-/// contacts carry more than they must, as in a jammed wedge, they may never do.
+/// contacts carry more than they must, as in a jammed wedge, they may never do. Moments of contacts that
+/// resist rolling are held, below their bounds, or put on those that the last normal impulses give.
 Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
 

@@ -23,15 +23,16 @@ std::vector<ContactSpring> springs_of(const BodyProblem& problem, double firmnes
 
 }  // namespace
 
-FirmContacts::FirmContacts(const BodyProblem& problem, double firmness)
-    : FirmContacts(problem, springs_of(problem, firmness)) {
+FirmContacts::FirmContacts(const BodyProblem& problem, double firmness, std::span<const MomentSpring> moments)
+    : FirmContacts(problem, springs_of(problem, firmness), moments) {
   for (const ContactEquation& c : problem.contacts) rho_.push_back(firmness * effective_mass(problem, c));
 }
 
-FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs)
+FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs,
+                           std::span<const MomentSpring> moments)
     : freedoms_(problem),
       masses_(freedoms_.masses()),
-      columns_(columns_of(problem, freedoms_, springs)),
+      columns_(columns_of(problem, freedoms_, springs, moments)),
       system_(freedoms_, masses_, pairs_of(columns_)) {
   for (const auto& [parts, stiffness] : columns_)
     Freedoms::each_two(parts, [&](std::size_t a, std::size_t b) {
@@ -42,12 +43,15 @@ FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSp
 
 std::vector<FirmContacts::Column> FirmContacts::columns_of(const BodyProblem& problem,
                                                            const Freedoms& freedoms,
-                                                           std::span<const ContactSpring> springs) {
+                                                           std::span<const ContactSpring> springs,
+                                                           std::span<const MomentSpring> moments) {
   std::vector<Column> columns;
   for (const ContactSpring& spring : springs) {
     const ContactEquation& c = problem.contacts[spring.contact];
     columns.push_back({freedoms.column(c, spring.direction), spring.stiffness});
   }
+  for (const MomentSpring& spring : moments)
+    columns.push_back({freedoms.column_of_moment(spring.contact, spring.axis), spring.stiffness});
   return columns;
 }
 

@@ -9,6 +9,7 @@
 
 #include "kernels/clusters/block_elimination.hpp"
 #include "kernels/clusters/freedoms.hpp"
+#include "kernels/clusters/rolling_contacts.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus {
@@ -25,10 +26,11 @@ struct ContactSpring {
 class FirmContacts {
  public:
   /// Each contact with the stiffness rho of `firmness` effective masses: along its normal, with mu > 0 in all
-  /// directions. Costs an elimination.
-  FirmContacts(const BodyProblem& problem, double firmness);
+  /// directions; and these springs of moments. Costs an elimination.
+  FirmContacts(const BodyProblem& problem, double firmness, std::span<const MomentSpring> moments = {});
   /// With these springs. The same cost.
-  FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs);
+  FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs)
+      : FirmContacts(problem, springs, {}) {}
 
   // The elimination knows the freedoms by their place.
   FirmContacts(const FirmContacts&) = delete;
@@ -46,13 +48,17 @@ class FirmContacts {
   Solution solve(std::span<const Twist> force) const;
 
  private:
+  FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs,
+               std::span<const MomentSpring> moments);
+
   /// What a spring does to the bodies of its contact.
   struct Column {
     Freedoms::Column parts;
     double stiffness;
   };
   static std::vector<Column> columns_of(const BodyProblem& problem, const Freedoms& freedoms,
-                                        std::span<const ContactSpring> springs);
+                                        std::span<const ContactSpring> springs,
+                                        std::span<const MomentSpring> moments);
   static std::vector<BlockElimination::Pair> pairs_of(std::span<const Column> columns);
   Eigen::VectorXd product(const Eigen::VectorXd& x) const;
 

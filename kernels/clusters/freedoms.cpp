@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "kernels/bodies/index.hpp"
+#include "kernels/clusters/rolling_contacts.hpp"
 
 namespace talus {
 
@@ -98,6 +99,15 @@ Freedoms::Column Freedoms::column(const ContactEquation& contact, const Vec3& di
     column[2] = halves[0];
     column[3] = halves[1];
   }
+  return column;
+}
+
+Freedoms::Column Freedoms::column_of_moment(std::size_t number, const Vec3& axis) const {
+  const ContactEquation& contact = problem_.contacts[number];
+  const auto [first, second] = push_of_moment(problem_, number, axis);
+  Column column{};
+  column[0] = part(at(contact.first), first);
+  if (contact.second >= 0) column[1] = part(at(contact.second), second);
   return column;
 }
 

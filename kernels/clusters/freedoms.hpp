@@ -39,6 +39,8 @@ class Freedoms {
   /// Of the blocks that a contact touches: its bodies, the second empty at a driven wall, and the cell.
   using Column = std::array<Part, 4>;
   Column column(const ContactEquation& contact, const Vec3& direction) const;
+  /// The same of a moment along `axis` at contact `number`, over its radii.
+  Column column_of_moment(std::size_t number, const Vec3& axis) const;
 
   /// visit(a, b) for each two places of a column that are not empty, also the same twice.
   template <class Visit>

@@ -48,6 +48,7 @@ std::vector<LoadedGroup> loaded_groups(const BodyProblem& cluster, std::span<con
     if (c.cell >= 0) c.cell = unknown[at(c.cell)];
     groups[own].problem.contacts.push_back(c);
     groups[own].problem.impulse.push_back(cluster.impulse[k]);
+    if (!cluster.rolling.empty()) groups[own].problem.rolling.push_back(cluster.rolling[k]);
     groups[own].contacts.push_back(k);
   }
   return groups;

@@ -9,6 +9,7 @@
 #include "kernels/bodies/index.hpp"
 #include "kernels/clusters/cluster_problem.hpp"
 #include "kernels/clusters/loaded_groups.hpp"
+#include "kernels/clusters/rolling_contacts.hpp"
 #include "kernels/global/stiffness.hpp"
 
 namespace talus {
@@ -28,6 +29,7 @@ enum Measure {
   pressed,
   grains,
   energy,
+  pulls,
   sums,
   drive = sums,
   fastest,
@@ -49,23 +51,27 @@ Vec3 face_shares(const BodyProblem& problem, const ContactEquation& c, const Vec
 
 Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
   Measures row{};
-  const std::vector<Twist> V = velocities_of(problem, problem.impulse);
+  // What pulls as hard as it presses does nothing, and must not hide what is wrong.
+  const std::vector<Twist> free = free_of_attraction(problem),
+                           done = added(velocities_of(problem, problem.impulse), -1, free);
   for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
     const BodyUnknown& body = problem.bodies[b];
     row[mass] += body.mass;
-    row[incoming] += kinetic2(body, body.free.u, body.free.w);
-    row[gained] += body.mass * (V[b].u - body.free.u).norm() + body.spin_mass * (V[b].w - body.free.w).norm();
+    row[incoming] += kinetic2(body, free[b].u, free[b].w);
+    row[gained] += body.mass * done[b].u.norm() + body.spin_mass * done[b].w.norm();
     if (body.wall || body.cell) continue;
     row[grains] += body.mass;
-    row[energy] += 0.5 * body.mass * (V[b].u - body.free.u).squaredNorm();
+    row[energy] += 0.5 * body.mass * done[b].u.squaredNorm();
   }
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
     const Vec3& r = problem.impulse[k];
     row[fastest] = larger(row[fastest], c.offset.norm());
     row[largest] = larger(row[largest], r.norm());
-    if (c.wall >= 0) row[pressed] += std::abs(c.normal.dot(r));
-    row[pressed] += face_shares(problem, c, faces).norm() * std::abs(c.normal.dot(r));
+    row[pulls] += c.pull;
+    const double felt = std::abs(c.normal.dot(r) - c.pull);
+    if (c.wall >= 0) row[pressed] += felt;
+    row[pressed] += face_shares(problem, c, faces).norm() * felt;
     if (r != Vec3::Zero()) row[drive] = larger(row[drive], c.drive);
   }
   return row;
@@ -77,6 +83,7 @@ double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
   const double sound = most_momentum(row[mass], row[incoming]) + row[mass] * row[fastest];
   return std::max({std::min(row[gained], sound),
                    row[drive] > 0 ? row[mass] * row[drive] : thresholds.interest * row[pressed],
+                   thresholds.held * row[pulls],
                    thresholds.rounding * most_momentum(row[mass], row[incoming])});
 }
 
@@ -233,7 +240,8 @@ class Answers {
     error.mends = any(&ClusterAnswer::helps, true);
     error.solved = !any(&ClusterAnswer::solved, false);
     error.jammed = any(&ClusterAnswer::jammed, true);
-    error.change = changes();
+    error.change = changes(&ClusterAnswer::impulse);
+    error.moments = changes(&ClusterAnswer::moment);
     error.exchanged = exchanged_;
     return error;
   }
@@ -319,16 +327,17 @@ class Answers {
     }
     return scale > 0 ? error / scale : 0;
   }
-  PartImpulses changes() const {
+  /// Of impulses or moments, of groups that it helps, per part and contact.
+  PartImpulses changes(std::vector<Vec3> ClusterAnswer::*which) const {
     PartImpulses change(parts_.size());
     for (std::size_t p = 0; p < parts_.size(); ++p)
       change[p].assign(parts_[p].contacts.size(), Vec3(Vec3::Zero()));
     for (std::size_t c = 0; c < clusters_.size(); ++c)
       for (const AnsweredGroup& own : groups_[c])
-        for (std::size_t k = 0; k < own.group.contacts.size() && own.answer.helps; ++k) {
+        for (std::size_t k = 0; k < (own.answer.*which).size() && own.answer.helps; ++k) {
           const ClusterProblem::Place& place = clusters_[c].contacts[own.group.contacts[k]];
           if (const std::size_t p = part_of(place.subdomain); p < parts_.size())
-            change[p][at(place.number)] = own.answer.impulse[k];
+            change[p][at(place.number)] = (own.answer.*which)[k];
         }
     return change;
   }

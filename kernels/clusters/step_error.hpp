@@ -22,6 +22,9 @@ struct StepErrorThresholds {
   /// impulses of its contacts, too. What happens elsewhere in a step must not hide that a column at rest
   /// falls: a ball that hits the floor beside it at 5 m/s does 5000 times as much, per mass.
   double elsewhere = 1e-6;
+  /// Of what cohesion holds a cluster together with, in (0, 1): one whose contacts do less, as they press as
+  /// hard as they pull, is measured by this part of it.
+  double held = 1e-6;
   /// Contacts without an impulse part a cluster into groups, unless under the answers of these they close
   /// with more than this part, in (0, 1), of what need not be told apart. In the so-many-th round of joining
   /// those that do, >= 1, what an answer of the whole cluster has carry joins, too, and in round twice that
@@ -41,11 +44,12 @@ struct StepError {
   double wall = 0;     ///< of the worst wall: its impulse, over the largest impulse of a wall; the faces of a
                        ///< cell are walls
   double contact = 0;  ///< of the worst contact: its impulse, over the largest of its group
-  PartImpulses change;  ///< of r, per part and contact, that mends it as far as answers help [N s]
-  bool mends = false;   ///< of clusters that are wrong by more than what is asked for it mends some
-  bool solved = true;   ///< of all of those an answer was found
-  bool jammed = false;  ///< of one of them there is none: walls close on grains that cannot get away
-  Exchanged exchanged;  ///< by the contacts of all clusters
+  PartImpulses change;   ///< of r, per part and contact, that mends it as far as answers help [N s]
+  PartImpulses moments;  ///< likewise of moments of rolling resistance [N m s]
+  bool mends = false;    ///< of clusters that are wrong by more than what is asked for it mends some
+  bool solved = true;    ///< of all of those an answer was found
+  bool jammed = false;   ///< of one of them there is none: walls close on grains that cannot get away
+  Exchanged exchanged;   ///< by the contacts of all clusters
 
   /// The worst of all, NaN where one is.
   double relative() const { return larger(larger(velocity, wall), contact); }
@@ -69,11 +73,12 @@ struct ErrorGoal {
 /// there it is the distance to one of the solutions, and that to the nearest is no larger. Where no answer is
 /// found the error is not known, and at least StepErrorThresholds::unknown. Collective.
 ///
-/// The scale of a group is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
-/// it; or the speed of driven walls times its mass, if that is more; where no wall is driven, at least a
-/// hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed at rest gain
-/// nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters do, by its
-/// share of the mass, nor than what rounding leaves of its own momentum.
+/// The scale of a group is sum m |V(r) - V_free|, what its contacts do, with cohesion and moments, as far as
+/// what comes in explains it; or the speed of driven walls times its mass, if that is more; where no wall is
+/// driven, at least a hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed
+/// at rest gain nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters
+/// do, by its share of the mass, nor of what cohesion holds it with, nor than what rounding leaves of its own
+/// momentum.
 StepError step_error(std::span<const BodyProblem> parts, const PartLink& link, const ErrorGoal& goal,
                      const StepErrorThresholds& thresholds = {});
 /// The whole problem in one part.

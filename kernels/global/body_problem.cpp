@@ -72,6 +72,7 @@ BodyProblem gather_problem(const StepReader& step, std::span<const char> taken, 
   each_taken([&](std::size_t c, std::size_t k) {
     problem.contacts.push_back(step.equation_at(c, k));
     problem.impulse.push_back(step.impulse_of(problem.contacts.back()));
+    if (step.rolls()) problem.rolling.push_back(step.rolling_at(k));
   });
   if (!step.knows_more() || step.contacts() == 0) return problem;
   problem.known.resize(problem.bodies.size());
@@ -94,6 +95,13 @@ BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPar
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts) {
   for (std::size_t k = 0; k < problem.contacts.size(); ++k)
     set_law_impulse(contacts, at(problem.contacts[k].place), problem.impulse[k]);
+  for (std::size_t k = 0; k < problem.rolling.size(); ++k) {
+    const std::size_t place = at(problem.contacts[k].place);
+    const Vec3& moment = problem.rolling[k].moment;
+    contacts.mx[place] = moment[0];
+    contacts.my[place] = moment[1];
+    contacts.mz[place] = moment[2];
+  }
 }
 
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse) {

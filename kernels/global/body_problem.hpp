@@ -60,8 +60,16 @@ struct ContactEquation {
   std::int32_t wall = -1;          ///< number of the wall; -1 between bodies
   std::int32_t cell = -1;          ///< unknown; -1 where no cell follows a stress
   Vec3 branch = Vec3::Zero();      ///< b/d there
+  double pull = 0;                 ///< of cohesion [N s]: r is beyond what the bodies feel by pull n
   double drive = 0;                ///< speed of the driven wall [m/s]; 0 between bodies
   const Levers* levers = nullptr;  ///< of a contact of blocks, in `Contacts`
+};
+
+/// What of a contact resists rolling (kernels/law/rolling_law.hpp).
+struct RollingPart {
+  double arm = 0;              ///< its moment is at most so much of the normal impulse [m]; 0: it has none
+  Vec3 spin = Vec3::Zero();    ///< angular velocity of a turning wall's material [rad/s]
+  Vec3 moment = Vec3::Zero();  ///< on the first body [N m s]
 };
 
 /// The whole problem, or the part of it that one subdomain holds: its contacts and the bodies that stand in
@@ -69,12 +77,15 @@ struct ContactEquation {
 struct BodyProblem {
   std::vector<BodyUnknown> bodies;
   std::vector<ContactEquation> contacts;
-  std::vector<Vec3> impulse;   ///< r on the first body [N s], one per contact, shifted by cohesion
-  std::vector<Twist> known;    ///< per unknown: sum over the contacts of this part of what they do to it
-                               ///< besides r [N s]; empty where that is nothing
-  std::size_t grains = 0;      ///< unknowns before the first wall
-  std::int32_t subdomain = 0;  ///< its number among all
-  std::vector<char> counts;    ///< per unknown: of its copies this one counts; empty: all do
+  std::vector<Vec3> impulse;  ///< r on the first body [N s], one per contact, shifted by cohesion
+  std::vector<Twist> known;   ///< per unknown: sum over the contacts of this part of what they do to it
+                              ///< besides r [N s]; empty where that is nothing
+  /// Per contact; empty where none resists rolling. What the moments do is known, until a solver says that
+  /// it changes them.
+  std::vector<RollingPart> rolling;
+  std::size_t grains = 0;            ///< unknowns before the first wall
+  std::int32_t subdomain = 0;        ///< its number among all
+  std::vector<char> counts;          ///< per unknown: of its copies this one counts; empty: all do
   std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
 
   bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
@@ -145,7 +156,7 @@ BodyProblem gather_problem(const BodyProblemSource& source);
 /// The same for one subdomain. Walls count in the first subdomain.
 BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part);
 
-/// Writes the impulses back.
+/// Writes the impulses, and moments of those that resist rolling, back.
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
 
 /// V = V_free + M^-1 H r, one entry per unknown, summed in order of contact.

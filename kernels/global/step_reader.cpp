@@ -134,6 +134,7 @@ ContactEquation StepReader::equation_at(std::size_t chunk, std::size_t place) co
     contact.cell = cell();
     if (w < 0) contact.branch = contacts.reach[place] * contact.normal;
   }
+  if (!contacts.cohesion.empty()) contact.pull = contacts.cohesion[place];
   contact.place = static_cast<std::int32_t>(place);
   contact.wall = w;
   if (source_.chunks.kind[chunk] == ChunkKind::blocks) contact.levers = &contacts.levers[place];
@@ -153,11 +154,21 @@ void StepReader::each_contact(const Visit& visit) const {
   });
 }
 
+Vec3 StepReader::moment_at(std::size_t place) const {
+  const Contacts& contacts = source_.contacts;
+  return kept_ != nullptr ? kept_->moment(candidate_at(place))
+                          : Vec3(contacts.mx[place], contacts.my[place], contacts.mz[place]);
+}
+
+RollingPart StepReader::rolling_at(std::size_t place) const {
+  const Contacts& contacts = source_.contacts;
+  const bool turning = !contacts.spin.empty() && contacts.second[place] < 0;
+  return {contacts.arm[place], turning ? contacts.spin[place] : Vec3(Vec3::Zero()), moment_at(place)};
+}
+
 /// Adds what the moment of a contact does to its bodies.
 void StepReader::add_moment(std::size_t place, const ContactEquation& contact, std::span<Twist> known) const {
-  const Contacts& contacts = source_.contacts;
-  const Vec3 moment = kept_ != nullptr ? kept_->moment(candidate_at(place))
-                                       : Vec3(contacts.mx[place], contacts.my[place], contacts.mz[place]);
+  const Vec3 moment = moment_at(place);
   const auto turn = [&](std::int32_t body, double sign) {
     if (body < 0) return;
     const BodyUnknown unknown = unknown_of_source(at(body));
@@ -172,7 +183,7 @@ void StepReader::add_known(std::span<Twist> known) const {
   each_place([&](std::size_t chunk, std::size_t place) {
     const ContactEquation contact = equation_at(chunk, place);
     if (!contacts.arm.empty()) add_moment(place, contact, known);
-    if (!contacts.cohesion.empty()) add_force(contact, -contacts.cohesion[place] * contact.normal, known);
+    if (contact.pull > 0) add_force(contact, -contact.pull * contact.normal, known);
   });
 }
 

@@ -45,9 +45,11 @@ class StepReader final : public ProblemReader {
   std::array<std::int32_t, 2> pair_at(std::size_t chunk, std::size_t place) const;
   ContactEquation equation_at(std::size_t chunk, std::size_t place) const;
   Vec3 impulse_of(const ContactEquation& contact) const;  ///< on its first body [N s]
+  bool rolls() const { return !source_.contacts.arm.empty(); }
+  RollingPart rolling_at(std::size_t place) const;  ///< where it rolls
 
   /// Contacts do something besides r (BodyProblem::known).
-  bool knows_more() const { return !source_.contacts.cohesion.empty() || !source_.contacts.arm.empty(); }
+  bool knows_more() const { return !source_.contacts.cohesion.empty() || rolls(); }
   /// Adds what they do, per unknown [N s].
   void add_known(std::span<Twist> known) const;
   /// Velocities without contacts instead of those of the source: an entry per unknown. Walls are given them
@@ -60,6 +62,7 @@ class StepReader final : public ProblemReader {
 
  private:
   bool has_cell() const { return source_.cell.mass > 0; }
+  Vec3 moment_at(std::size_t place) const;
   std::size_t candidate_at(std::size_t place) const { return at(source_.contacts.candidate[place]); }
   double copies(std::size_t slot) const { return source_.parts.empty() ? 1 : source_.parts[slot]; }
   BodyUnknown unknown_of_source(std::size_t body) const;

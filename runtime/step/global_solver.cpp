@@ -243,6 +243,7 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
       step_error(problems_, *link_,
                  {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls, .faces = faces});
   change_ = std::move(error.change);
+  moments_ = std::move(error.moments);
   mends_ = error.mends;
   // For `correct` the contacts and their impulses are enough.
   if (!mends_) problems_ = {};
@@ -307,13 +308,15 @@ WorstErrors GlobalSolver::worst_errors() const {
 void GlobalSolver::correct() {
   for (std::size_t p = 0; p < problems_.size(); ++p) {
     for (std::size_t k = 0; k < change_[p].size(); ++k) problems_[p].impulse[k] += change_[p][k];
+    for (std::size_t k = 0; k < problems_[p].rolling.size(); ++k)
+      problems_[p].rolling[k].moment += moments_[p][k];
     scatter_impulses(problems_[p], state_.contacts);
   }
 }
 
 void GlobalSolver::release_room() {
   problems_ = {};
-  change_ = {};
+  change_ = moments_ = {};
   mends_ = false;
 }
 

@@ -113,7 +113,7 @@ class GlobalSolver {
   BodyGroups groups_;                        ///< the large clusters
   bool small_ = false, large_ = false, twice_ = false;
   std::vector<BodyProblem> problems_;  ///< of the last small_error
-  PartImpulses change_;                ///< found there [N s]
+  PartImpulses change_, moments_;      ///< found there [N s, N m s]
   bool mends_ = false;
   double small_seconds_ = 0;  ///< take_small_seconds
 };

@@ -188,6 +188,20 @@ TEST(CertificateReference, AGrainMeetsAFloorThatOnlyGravityBringsItTo) {
   EXPECT_NEAR(solved(problem).motion.u[0][2], -gap / h, 1e-9 * g * h);
 }
 
+TEST(CertificateReference, WhereTheRunCarriesAGapOfRoundingIsNone) {
+  for (const double gap : {7e-18, 1e-9}) {
+    Step step(0, 0, 1);
+    constexpr double apart = 1e-9;  // [m/s]; their gap is that of the middle of the step
+    step.grain({-R, 0, 0}, R, {-apart, 0, 0});
+    step.grain({R + gap - h / 2 * apart, 0, 0}, R);
+    Frame after = step.before;
+    after.contact_bodies.push_back({0, 1});
+    ASSERT_TRUE(step.problem().contacts.empty()) << gap;
+    const StepInput input{step.before, {}, {}, step.stage, step.bodies, step.setup, 0, 0, &after};
+    EXPECT_EQ(rebuild_step(input).contacts.size(), gap < 1e-12 ? 1U : 0U) << gap;
+  }
+}
+
 TEST(CertificateReference, OfAGrainThatMayBeJammedOrFallTellsWhatTheRunHasFound) {
   // Between two parallel walls friction holds it once they press, and nothing makes them press: jammed, or in
   // free fall, both are answers.
