@@ -83,6 +83,23 @@ std::vector<io::SceneChange> changes_since(const std::filesystem::path& resolved
   }
 }
 
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// Whether a key names an input file that stands elsewhere now and holds the same: a folder that was moved.
+bool only_moved(const io::SceneChange& change, const io::Scene& scene, const ResumePoint& point) {
+  const auto unquoted = [](const std::string& text) {
+    return text.size() >= 2 ? text.substr(1, text.size() - 2) : text;
+  };
+  const std::string file = unquoted(change.is);
+  const std::vector<std::string> inputs = io::input_files(scene);
+  const auto then = point.file.texts.find(input_prefix + unquoted(change.was));
+  return then != point.file.texts.end() && std::ranges::find(inputs, file) != inputs.end() &&
+         bytes_of(file) == then->second;
+}
+
 }  // namespace
 
 std::optional<ResumePoint> find_resume_point(const std::filesystem::path& directory, const io::Scene& scene,
@@ -118,13 +135,11 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
   point.changes = io::scene_changes(text(resolved_text), resolved);
   std::vector<std::string> refused;
   for (const io::SceneChange& change : point.changes)
-    if (!change.allowed) refused.push_back(io::describe(change));
+    if (!change.allowed && !only_moved(change, scene, point)) refused.push_back(io::describe(change));
   for (const std::string& file : io::input_files(scene)) {
     const auto known = point.file.texts.find(input_prefix + file);
     if (known == point.file.texts.end()) continue;  // a change of a key
-    std::ifstream now(file, std::ios::binary);
-    if (std::string(std::istreambuf_iterator<char>(now), {}) != known->second)
-      refused.push_back(file + " has changed");
+    if (bytes_of(file) != known->second) refused.push_back(file + " has changed");
   }
   if (refused.empty()) return;
   constexpr std::size_t most_named = 8;

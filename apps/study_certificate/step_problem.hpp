@@ -77,8 +77,8 @@ struct StepInput {
   const Setup& setup;             ///< alert distance, overlap correction, rotation, cell
   std::size_t stage_index = 0;    ///< of `stage` in the setup
   double time = 0;                ///< since the stage began [s]
-  /// If given: which side of nothing a gap of rounding is on, of bodies that carry in it. That decides whether
-  /// bodies that bounce off one another are a contact.
+  /// If given: which side of nothing a gap of rounding is on, of bodies that carry in it. That decides
+  /// whether bodies that bounce off one another are a contact.
   const Frame* after = nullptr;
 };
 

@@ -121,9 +121,12 @@ std::vector<Triangle> read_text(const std::string& path, std::string_view text) 
 }  // namespace
 
 std::vector<Triangle> read_stl(const std::string& path) {
+  if (std::filesystem::is_directory(path)) throw FileError(path, "is a directory, not an STL file");
+  // Of a pipe the end may never come.
+  if (std::filesystem::exists(path) && !std::filesystem::is_regular_file(path))
+    throw FileError(path, "is no regular file");
   std::ifstream in(path, std::ios::binary);
   if (!in) throw FileError(path, "cannot be opened: " + std::generic_category().message(errno));
-  if (std::filesystem::is_directory(path)) throw FileError(path, "is a directory, not an STL file");
   std::ostringstream held;
   held << in.rdbuf();
   const std::string bytes = std::move(held).str();

@@ -168,6 +168,22 @@ TEST_F(ResumeRefusals, OfAnInputFileThatIsNotTheOneInTheCheckpoint) {
   EXPECT_EQ(files_below(at("out")), before);
 }
 
+TEST_F(ResumeRefusals, IsNoneOfAnInputFileThatHasOnlyMoved) {
+  write_fall();
+  ASSERT_EQ(run("run fall.toml --out out --threads 1 --resume --steps 2").code, 0);
+  ASSERT_GT(checkpoints("out"), 0U);
+  fs::create_directory(at("elsewhere"));
+  for (const char* name : {"fall.toml", "grains.csv"})
+    fs::rename(at(name), at(std::string("elsewhere/") + name));
+  const std::string line = "run elsewhere/fall.toml --out out --threads 1 --resume";
+  write(at("elsewhere/other.csv"), "id,x,y,z,radius\n1,0,0,1,0.01\n");
+  const Outcome other = run(line + " --set sample.file=elsewhere/other.csv");
+  EXPECT_EQ(other.code, 2) << other.messages;
+  const Outcome same = run(line);
+  EXPECT_EQ(same.code, 0) << same.messages;
+  EXPECT_NE(same.messages.find("step 3"), std::string::npos) << same.messages;
+}
+
 /// A run that ended before its scene was written has no results yet, whatever it has begun to write.
 TEST_F(ResumeRefusals, AreNoneBesideALogAndASceneHalfWritten) {
   fs::create_directory(at("out"));
