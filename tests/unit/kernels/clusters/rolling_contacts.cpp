@@ -94,6 +94,27 @@ TEST(RollingContacts, ARollingBallIsSlowedByItsMomentOverTheInertiaAboutTheFloor
   EXPECT_NEAR(V.w.y(), V.u.x(), 1e-6 * fall);
 }
 
+// The moment and the friction of before act to the side, and the ball all but stops: there a small rate turns
+// a moment far.
+TEST(RollingContacts, AMomentAtItsBoundTurnsAgainstTheRolling) {
+  constexpr double arm = 0.05 * R, stops = arm * fall / (1.4 * R), speed = 1.001 * stops;
+  BodyProblem problem;
+  add_grain(problem, Vec3(0, 0, R), 0.5);
+  problem.bodies[0].free.u.x() = speed;
+  problem.bodies[0].free.w.y() = speed;
+  add_contact(problem, 0, -1, Vec3::UnitZ(), 0.5, 0);
+  problem.impulse[0] = Vec3(0, 0.4 * fall, fall);  // likewise
+  problem.rolling.push_back({arm, Vec3::Zero(), Vec3::Zero()});
+  const BodyProblem aside = with_moments(problem, std::vector{Vec3(arm * fall, 0, 0)});
+  const StepError error = step_error(aside, {.enough = 1e-4});
+  EXPECT_TRUE(error.solved);
+  const BodyProblem now = mended(aside, error);
+  EXPECT_NEAR(now.rolling[0].moment.y(), -arm * fall, 1e-4 * arm * fall);
+  const Twist V = velocities_of(now, now.impulse)[0];
+  EXPECT_NEAR(V.u.x(), speed - stops, 1e-5 * stops);
+  EXPECT_NEAR(V.w.x(), 0, 1e-5 * stops);
+}
+
 // Across the direction of sliding a moment holds the ball in the tangent plane, not in the edge of the cone.
 TEST(RollingContacts, AMomentHoldsABallThatSlidesSideways) {
   constexpr double mu = 0.1, speed = 3;
@@ -118,7 +139,7 @@ TEST(RollingContacts, AContactThatOpensLosesItsMoment) {
   problem.bodies[0].free = {Vec3(1, 0, 2), Vec3(0, 3, 0)};
   add_contact(problem, 0, -1, Vec3::UnitZ(), 0.5, 0);
   problem.impulse[0].z() = fall;
-  problem.rolling.push_back({0.1 * R, Vec3::Zero(), Vec3::Zero()});
+  problem.rolling.push_back({1e3 * R, Vec3::Zero(), Vec3::Zero()});
   const BodyProblem then = with_moments(problem, std::vector{Vec3(0, -0.05 * R * fall, 0)});
   const BodyProblem now = mended(then, step_error(then, {.enough = 1e-6}));
   EXPECT_NEAR(now.impulse[0].norm(), 0, 1e-9 * fall);
