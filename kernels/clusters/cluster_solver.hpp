@@ -66,9 +66,9 @@ struct ClusterAnswer {
 /// those of impulses that meet the law; and where these do not either, with what is left of the budget the
 /// solvers that keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again
 /// from there; not where steps of all kinds were stuck (Correction::stuck). All but the rounds take moments
-/// of rolling resistance as given, and so find no answer where there are any: only what mends impulses. All
-/// by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values that
-/// are not finite come back as an error that is not.
+/// of rolling resistance as given: beside their answers what the rounds would change counts as error, if it
+/// is more, an estimate. All by counted work, so the same bits come out every time. The changed impulses lie
+/// on the cones. Values that are not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

@@ -285,7 +285,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
                    : friction ? thresholds.most_sliding_rounds
                               : thresholds.most_rounds;
   int rounds = 0;
-  double at_first = 0, moved = std::numeric_limits<double>::infinity();
+  double at_first = 0, rest = 0, moved = std::numeric_limits<double>::infinity();
   for (int since = 0; rounds < most && since < thresholds.patience; ++since) {
     ++rounds;
     Correction now;
@@ -303,7 +303,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     // Of further rounds: the direction of sliding may lag by the same small part in each.
     const double to_come = rest_of(moved, now.moved, now.left);
     moved = now.moved;
-    now.rest = std::min(to_come, thresholds.creeping * now.moved);
+    rest = std::min(to_come, thresholds.creeping * now.moved);
     if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
     const bool stays = friction ? set.state == then && set.rolling.same_as(rolled)
                                 : stand(problem, then, thresholds.rounding, set);
@@ -320,6 +320,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     if (best.settled) break;
   }
   best.rounds = rounds;
+  best.rest = rest;
   best.at_first = at_first;
   return best;
 }

@@ -85,8 +85,8 @@ struct Correction {
   double coming = 0;           ///< and what further ones would add, by the ratio of the last two [N s]
   double pushed = 0;  ///< part of the largest impulse by which the last update, or the last proximal step,
                       ///< has changed an impulse, at most
-  double rest = 0;    ///< what further rounds would add, by the ratio of the last two, or so many like the
-                      ///< last (CorrectionThresholds::creeping) [N s]
+  double rest = 0;    ///< what further rounds would add to the last, by the ratio of the last two, or so many
+                      ///< like it (CorrectionThresholds::creeping) [N s]
   int rounds = 0;
   bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
                          ///< changed next to nothing, and so will further ones; and rounding leaves less than
