@@ -106,8 +106,7 @@ TEST(RollingResistance, OfALineOfBallsIsTheSameInOneSubdomainAndInSeveral) {
 }
 
 // Each sweep changes moments and shear by little, and cohesion presses a hundred times as hard as the beam
-// weighs: by what contacts exchange without it, all of the beam fell at its first steps, which were
-// certified.
+// weighs: measured by that, steps were certified in which all of the beam fell.
 TEST(RollingResistance, HoldsABeamOfBallsOnAWallByTheMomentOfItsWeight) {
   constexpr int grains = 20;
   constexpr double mass = 2;
