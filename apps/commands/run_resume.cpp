@@ -83,7 +83,8 @@ std::vector<io::SceneChange> changes_since(const std::filesystem::path& resolved
   }
 }
 
-std::string bytes_of(const std::string& path) {
+/// Nothing of a file that cannot be read.
+std::string bytes_of(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
 }
@@ -195,8 +196,8 @@ void demand_results_of_scene(const std::filesystem::path& directory, const io::S
   const std::filesystem::path resolved = directory / resolved_text, run_json = directory / "run.json";
   std::error_code unknown;
   if (!std::filesystem::is_regular_file(resolved, unknown) && !done) return demand_no_results(directory);
-  std::ifstream file(resolved, std::ios::binary), json(run_json);
-  const std::string then(std::istreambuf_iterator<char>(file), {});
+  std::ifstream json(run_json);
+  const std::string then = bytes_of(resolved);
   const auto unread = [&](const std::filesystem::path& path) {
     return std::invalid_argument(path.string() +
                                  ": cannot be read, so that nobody knows of which scene the run there was. "
@@ -223,8 +224,7 @@ void demand_results_of_scene(const std::filesystem::path& directory, const io::S
 }
 
 bool has_ends_of(const std::filesystem::path& directory, const io::Scene& scene) {
-  std::ifstream file(directory / resolved_text, std::ios::binary);
-  const std::string then(std::istreambuf_iterator<char>(file), {});
+  const std::string then = bytes_of(directory / resolved_text);
   if (then.empty()) return true;
   try {
     return std::ranges::none_of(changes_since(directory / resolved_text, then, scene), io::moves_an_end);
