@@ -125,13 +125,14 @@ void set_velocity(const io::SampleSpec& spec, Sample& sample) {
 Sample make_part(const io::Scene& scene, std::size_t k, std::span<const Sample> before) {
   using Kind = io::SampleSpec::Kind;
   const io::SampleSpec& spec = scene.samples[k];
-  if (spec.kind == Kind::bodies)
-    return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
   Sample sample;
+  if (spec.kind == Kind::bodies)
+    sample = io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;
   if (!scene.setup.clumps.empty()) sample.shape = mass_of(1, scene.setup.clumps.front());
   sample.seed = scene.setup.seed;
+  if (spec.kind == Kind::bodies) return sample;
   const auto stream = static_cast<std::uint32_t>(k);
   const auto draw = [&](std::size_t n) { return draw_radii(spec.radii, n, scene.setup.seed, stream); };
   if (spec.kind == Kind::body) {
@@ -171,6 +172,10 @@ void check(const io::Scene& scene, const Sample& sample) {
     if (!sample.velocity.empty() &&
         !std::ranges::all_of(sample.velocity[k], [](double v) { return std::isfinite(v); }))
       refuse("radius times angular velocity is not finite");
+    if (!sample.velocity.empty() && sample.shape.number != 0 &&
+        std::any_of(sample.velocity[k].begin() + 3, sample.velocity[k].end(),
+                    [](double w) { return w != 0; }))
+      refuse("clumps begin without rotation; leave wx, wy, wz out");
   }
 }
 

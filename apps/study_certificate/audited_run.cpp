@@ -52,7 +52,7 @@ Frame mean_of_impact(double E, const Frame& before, const Frame& after, const Ce
 
 void judge(const StepProblem& problem, const Start& start, const Frame& after, const ReferenceLimits& limits,
            AuditedStep& step) {
-  step.contacts = static_cast<std::int64_t>(problem.contacts.size());
+  step.contacts = std::ranges::count(problem.contacts, false, &StepContact::is_moment);
   step.smooth = problem.smooth();
   std::size_t clusters = 0;
   clusters_of(problem, clusters);
@@ -62,7 +62,8 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   if (problem.cell.repeats)
     cell = end_in_cell(problem.cell, start.stage.time_step, problem.reflection, start.before, after);
   const Frame mean = mean_of_impact(problem.reflection, start.before, after, cell);
-  const StepEnd end{mean, run.r, cell.gained};
+  const std::vector<Vec3> spins = spins_at_end(problem, after);
+  const StepEnd end{mean, run.r, spins, cell.gained};
   step.unexplained = disagreement(problem, end);
   if (run.unknown > 0 || !(step.unexplained <= rounding)) {
     step.judged = Judged::other_problem;

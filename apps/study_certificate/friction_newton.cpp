@@ -69,26 +69,28 @@ FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
   for (std::size_t c = 0; c < contacts; ++c) {
     const StepContact& contact = problem.contacts[c];
     const Eigen::Matrix3d frame = frame_of(contact.normal);
+    const bool moment = contact.is_moment();
     double normal = 0, tangential = 0;
-    const auto add_grain = [&](std::size_t k, double sign) {
-      normal += 1 / problem.mass[k];
-      tangential += 1 / problem.mass[k] + problem.spin_mobility[k];
+    const StepLevers B = levers_of(contact);
+    const auto add_grain = [&](std::size_t k, double sign, const Mat3& lever) {
+      const Eigen::Matrix3d turn = frame.transpose() * lever;
+      const double mobility = problem.spin_mobility[k];
+      const double inv_mass = moment ? 0 : 1 / problem.mass[k];
+      normal += inv_mass + mobility * turn.row(0).squaredNorm();
+      tangential += inv_mass + mobility * std::max(turn.row(1).squaredNorm(), turn.row(2).squaredNorm());
       const auto column = 6 * static_cast<Eigen::Index>(k);
-      Eigen::Matrix3d cross;  // v = ... - w x n = n x w
-      const Vec3& n = contact.normal;
-      cross << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
-      add_body(entries, c, column, sign * std::sqrt(1 / problem.mass[k]) * frame.transpose());
-      add_body(entries, c, column + 3, std::sqrt(problem.spin_mobility[k]) * frame.transpose() * cross);
+      add_body(entries, c, column, sign * std::sqrt(inv_mass) * frame.transpose());
+      add_body(entries, c, column + 3, sign * std::sqrt(mobility) * turn);
     };
-    add_grain(contact.first, 1);
+    add_grain(contact.first, 1, B.first);
     if (!contact.at_wall()) {
-      add_grain(contact.other(), -1);
-    } else if (const double inv_mass = problem.wall_inv_mass[contact.wall()]; inv_mass > 0) {
+      add_grain(contact.other(), -1, B.second);
+    } else if (const double inv_mass = problem.wall_inv_mass[contact.wall()]; inv_mass > 0 && !moment) {
       normal += inv_mass;
       entries.emplace_back(row_of(c), static_cast<Eigen::Index>(6 * grains + contact.wall()),
                            -std::sqrt(inv_mass));
     }
-    if (problem.cell.follows() && !contact.at_wall()) {
+    if (problem.cell.follows() && !contact.at_wall() && !moment) {
       const double of_cell = cell_mobility(problem.cell, contact.branch);
       normal += of_cell;
       tangential += of_cell;
@@ -97,13 +99,16 @@ FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
             std::sqrt(problem.cell.mobility[k]) *
             (frame.transpose() * stretched(CellVector::Unit(k), contact.branch));
     }
-    scale_.segment<3>(row_of(c)) << 1 / std::sqrt(normal), 1 / std::sqrt(tangential),
-        1 / std::sqrt(tangential);
+    if (moment) normal = 1;  // it has no normal part
+    const double own = 1 / std::sqrt(normal), across = 1 / std::sqrt(tangential);
+    scale_.segment<3>(row_of(c)) << own, across, across;
+    carrier_.push_back(moment ? c - 1 : c);
     q_.segment<3>(row_of(c)) =
         frame.transpose() * (relative_velocity(contact, problem.free)) + Vec3(contact.bias, 0, 0);
-    friction_.push_back(contact.friction * std::sqrt(tangential / normal));
+    friction_.push_back(contact.friction * scale_[row_of(carrier_[c])] / across);
     frame_.push_back(frame);
-    least_unit_ = std::max(least_unit_, speeds * speed_of_bodies(problem, contact) / std::sqrt(normal));
+    if (!moment)
+      least_unit_ = std::max(least_unit_, speeds * speed_of_bodies(problem, contact) / std::sqrt(normal));
   }
   q_ = q_.cwiseProduct(scale_).eval();
   Matrix H(row_of(contacts), static_cast<Eigen::Index>(6 * grains + problem.wall_normal.size()));
@@ -131,9 +136,9 @@ FrictionNewton::Vector FrictionNewton::law(const Vector& s, const Vector& centre
   Vector F = s;
   for (std::size_t c = 0; c < frame_.size(); ++c) {
     const Eigen::Index k = row_of(c);
-    const double normal = std::max(0.0, z[k]), size = std::hypot(z[k + 1], z[k + 2]);
+    const double normal = std::max(0.0, z[row_of(carrier_[c])]), size = std::hypot(z[k + 1], z[k + 2]);
     const double most = friction_[c] * normal, part = size > most ? (size > 0 ? most / size : 0) : 1;
-    F[k] -= normal;
+    if (carrier_[c] == c) F[k] -= normal;
     F[k + 1] -= part * z[k + 1];
     F[k + 2] -= part * z[k + 2];
   }
@@ -147,13 +152,14 @@ double FrictionNewton::unit(std::span<const Vec3> r) const {
   return size;
 }
 
-/// P' of contact c at z; 0 where it is open.
+/// P' of contact c at z; 0 where it is open. The first column is by the normal part of what it belongs to.
 void FrictionNewton::derivative(const Vector& z, std::size_t c, Eigen::Matrix3d& D) const {
   const Eigen::Index k = row_of(c);
+  const double normal = z[row_of(carrier_[c])];
   D.setZero();
-  if (z[k] <= 0) return;
-  const double most = friction_[c] * z[k], size = std::hypot(z[k + 1], z[k + 2]);
-  D(0, 0) = 1;
+  if (normal <= 0) return;
+  const double most = friction_[c] * normal, size = std::hypot(z[k + 1], z[k + 2]);
+  D(0, 0) = carrier_[c] == c ? 1 : 0;
   if (size <= most) {
     D(1, 1) = D(2, 2) = friction_[c] > 0 ? 1 : 0;
   } else if (most > 0) {
@@ -192,7 +198,7 @@ bool FrictionNewton::step(const Vector& s, const Vector& F, const Near& near, Ve
   std::vector<Eigen::Index> place(static_cast<std::size_t>(size), -1);
   Eigen::Index rows = 0;
   for (std::size_t c = 0; c < frame_.size(); ++c)
-    if (z[row_of(c)] > 0)
+    if (z[row_of(carrier_[c])] > 0)
       for (Eigen::Index i = 0; i < 3; ++i) place[static_cast<std::size_t>(row_of(c) + i)] = rows++;
   ds = -F;
   if (rows == 0) return true;
@@ -201,11 +207,12 @@ bool FrictionNewton::step(const Vector& s, const Vector& F, const Near& near, Ve
   for (std::size_t c = 0; c < frame_.size(); ++c) {
     const Eigen::Index k = row_of(c), row = place[static_cast<std::size_t>(k)];
     if (row < 0) continue;
+    const Eigen::Index carrier = place[static_cast<std::size_t>(row_of(carrier_[c]))];
     derivative(z, c, D);
     for (Eigen::Index i = 0; i < 3; ++i) {
       select.emplace_back(row + i, k + i, 1);
       for (Eigen::Index j = 0; j < 3; ++j)
-        if (D(i, j) != 0) derivatives.emplace_back(row + i, row + j, D(i, j));
+        if (D(i, j) != 0) derivatives.emplace_back(row + i, j == 0 ? carrier : row + j, D(i, j));
     }
   }
   Matrix S(rows, size), P(rows, rows), one(rows, rows);

@@ -70,6 +70,7 @@ class FrictionNewton {
 
   std::vector<Eigen::Matrix3d> frame_;  ///< columns normal and two tangents, of each contact
   std::vector<double> friction_;        ///< in scaled coordinates
+  std::vector<std::size_t> carrier_;    ///< whose normal part bounds it: itself, or of a moment its contact
   Vector scale_, q_;                    ///< 3 per contact
   double least_unit_ = 1e-300;
   Matrix W_;              ///< without what the cell adds, cell_ cell_^T

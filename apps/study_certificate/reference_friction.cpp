@@ -38,6 +38,10 @@ class Sweeps {
  public:
   explicit Sweeps(const StepProblem& problem) : problem_(problem) {
     for (const StepContact& contact : problem.contacts) {
+      if (contact.levers) {
+        mobility_.push_back(by_levers(contact));
+        continue;
+      }
       Mobility m{1 / problem.mass[contact.first], 0};
       m.tangential = m.normal + problem.spin_mobility[contact.first];
       if (contact.at_wall()) {
@@ -69,23 +73,48 @@ class Sweeps {
     double normal, tangential;
   };
 
+  /// Normal and tangential parts of a clump's contact depend on one another: the largest response of all
+  /// stands for both, with which sweeps still converge.
+  Mobility by_levers(const StepContact& contact) const {
+    Mat3 W = Mat3::Zero();
+    const double moves = contact.is_moment() ? 0 : 1;
+    const auto add = [&](std::size_t body, const Mat3& lever) {
+      W += moves * Mat3::Identity() / problem_.mass[body] +
+           problem_.spin_mobility[body] * lever * lever.transpose();
+    };
+    add(contact.first, contact.levers->first);
+    if (!contact.at_wall())
+      add(contact.other(), contact.levers->second);
+    else
+      W += moves * problem_.wall_inv_mass[contact.wall()] * contact.normal * contact.normal.transpose();
+    const double most = Eigen::SelfAdjointEigenSolver<Mat3>(W).eigenvalues()[2];
+    return {most, most};
+  }
+
+  static Vec3 bounded(Vec3 tangential, double most) {
+    const double size = tangential.norm();
+    if (size > most) tangential *= size > 0 ? most / size : 0;
+    return tangential;
+  }
+
   /// The impulse that meets the law at contact c, everything else held.
-  Vec3 answer(std::size_t c, const Vec3& now, const Vec3& v) const {
+  Vec3 answer(std::size_t c, const Vector& r, const Vec3& v) const {
     const StepContact& contact = problem_.contacts[c];
-    const Vec3& n = contact.normal;
+    const Vec3 &n = contact.normal, now = at(r, c);
+    if (contact.is_moment())
+      return bounded(now - v / mobility_[c].tangential,
+                     contact.friction * std::max(0.0, at(r, c - 1).dot(n)));
     const double v_n = v.dot(n), r_n = now.dot(n);
     const double normal = std::max(0.0, r_n - (v_n + contact.bias) / mobility_[c].normal);
     if (contact.friction == 0) return normal * n;
-    Vec3 tangential = now - r_n * n - (v - v_n * n) / mobility_[c].tangential;
-    const double size = tangential.norm(), most = contact.friction * normal;
-    if (size > most) tangential *= size > 0 ? most / size : 0;
-    return normal * n + tangential;
+    return normal * n +
+           bounded(now - r_n * n - (v - v_n * n) / mobility_[c].tangential, contact.friction * normal);
   }
 
   void solve(std::size_t c, Vector& r) {
     const StepContact& contact = problem_.contacts[c];
     const Vec3 now = at(r, c);
-    const Vec3 next = answer(c, now, relative_velocity(contact, motion_));
+    const Vec3 next = answer(c, r, relative_velocity(contact, motion_));
     at(r, c) = next;
     add_impulse(problem_, contact, next - now, motion_);
   }

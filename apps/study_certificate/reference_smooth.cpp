@@ -58,15 +58,21 @@ Dual dual_of(const StepProblem& problem) {
   for (Eigen::Index c = 0; c < contacts; ++c) {
     const StepContact& contact = problem.contacts[static_cast<std::size_t>(c)];
     std::vector<Eigen::Triplet<Real>> row;
-    const auto add = [&](std::size_t body, Real sign) {
-      const Real root = std::sqrt(1 / static_cast<Real>(problem.mass[body]));
+    const auto add = [&](std::size_t body, Real sign, const Mat3& lever) {
+      const Real root = std::sqrt(1 / static_cast<Real>(problem.mass[body])),
+                 turning = std::sqrt(static_cast<Real>(problem.spin_mobility[body]));
+      const auto place = static_cast<Eigen::Index>(body);
       for (Eigen::Index k = 0; k < 3; ++k)
-        row.emplace_back(c, 3 * static_cast<Eigen::Index>(body) + k,
-                         sign * root * static_cast<Real>(contact.normal[k]));
+        row.emplace_back(c, 3 * place + k, sign * root * static_cast<Real>(contact.normal[k]));
+      if (!contact.levers) return;  // normal forces do not turn spheres
+      const Vec3 turn = lever.transpose() * contact.normal;
+      for (Eigen::Index k = 0; k < 3; ++k)
+        row.emplace_back(c, 3 * grains + walls + 3 * place + k, sign * turning * static_cast<Real>(turn[k]));
     };
-    add(contact.first, 1);
+    const StepLevers B = levers_of(contact);
+    add(contact.first, 1, B.first);
     if (!contact.at_wall())
-      add(contact.other(), -1);
+      add(contact.other(), -1, B.second);
     else if (problem.wall_inv_mass[contact.wall()] > 0)
       row.emplace_back(c, 3 * grains + static_cast<Eigen::Index>(contact.wall()),
                        -std::sqrt(static_cast<Real>(problem.wall_inv_mass[contact.wall()])));
@@ -85,9 +91,13 @@ Dual dual_of(const StepProblem& problem) {
     v -= (contact.at_wall() ? problem.free.walls[contact.wall()] : problem.free.u[contact.other()])
              .cast<Real>();
     v -= contact.drift.cast<Real>();
+    if (contact.levers) {
+      v += (B.first * problem.free.w[contact.first]).cast<Real>();
+      if (!contact.at_wall()) v -= (B.second * problem.free.w[contact.other()]).cast<Real>();
+    }
     dual.q[c] = dual.scale[c] * (contact.normal.cast<Real>().dot(v) + static_cast<Real>(contact.bias));
   }
-  Matrix G(contacts, 3 * grains + walls);
+  Matrix G(contacts, 6 * grains + walls);
   G.setFromTriplets(entries.begin(), entries.end());
   dual.W = G * Matrix(G.transpose());
   return dual;
@@ -325,7 +335,9 @@ Real unit_of(const StepProblem& problem, const Dual& dual, const Vector& s, cons
 
 }  // namespace
 
-double unavoidable_approach(const StepProblem& problem, const ReferenceLimits& limits) {
+double unavoidable_approach(const StepProblem& given, const ReferenceLimits& limits) {
+  StepProblem problem = given;
+  std::erase_if(problem.contacts, &StepContact::is_moment);
   const Dual dual = dual_of(problem);
   Vector s = Vector::Zero(dual.q.size());
   const Real unit = unit_of(problem, dual, s, limits);

@@ -17,12 +17,14 @@ class SceneBench {
 
   Draws draws;
   MadeScene made;
-  double radius;          ///< [m] of a usual grain
-  double gravity;         ///< [m/s^2] along -z; 0 for scenes in flight
-  double speed = 0;       ///< [m/s] that grains have at the beginning
-  double wall_speed = 0;  ///< [m/s] of walls that move by themselves, the largest
-  double cohesion = 0;    ///< [N] of all pairs
-  int size;               ///< MakerSettings::size
+  double radius;                        ///< [m] of a usual grain
+  double gravity;                       ///< [m/s^2] along -z; 0 for scenes in flight
+  double speed = 0;                     ///< [m/s] that grains have at the beginning
+  double wall_speed = 0;                ///< [m/s] of walls that move by themselves, the largest
+  double cohesion = 0;                  ///< [N] of all pairs
+  double rolling = 0;                   ///< rolling resistance of all pairs; then they have friction
+  BodyShape shape = BodyShape::sphere;  ///< of all grains
+  int size;                             ///< MakerSettings::size
   int steps;
   /// Of a cell: flow, stress and time step of the first stage, and of the second one, behind a change of
   /// loads. None between walls.
@@ -76,5 +78,7 @@ void make_shaken(SceneBench& bench);
 void make_sticky(SceneBench& bench);
 void make_apart(SceneBench& bench);
 void make_touching(SceneBench& bench);
+void make_clumps(SceneBench& bench);
+void make_rolling(SceneBench& bench);
 
 }  // namespace talus::audit

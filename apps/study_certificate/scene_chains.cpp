@@ -212,4 +212,29 @@ void make_touching(SceneBench& bench) {
   bench.add_moving(at_its_height + Vec3(0, 0, 2 * r), r, -u);
 }
 
+/// A beam that one wall holds, or a heap.
+void make_rolling(SceneBench& bench) {
+  Draws& draws = bench.draws;
+  bench.rolling = draws.between_decades(1e-3, 1);
+  const double R = bench.radius;
+  if (draws.chance(0.4)) {
+    bench.speed = 0;
+    bench.cohesion = bench.weight() * draws.between_decades(1, 1e4);
+    double x = 0;
+    for (int k = bench.draw_count(1, 30); k > 0; --k) {
+      const double r = bench.draw_radius();
+      bench.add({x + r, 0, 0}, r);
+      x += 2 * r;
+    }
+    bench.add_wall("x-", Vec3::Zero(), Vec3::UnitX());
+    return;
+  }
+  const double base = R * draws.between(2.2, 10);
+  for (int k = bench.draw_count(1, 80); k > 0; --k)
+    bench.drop(draws.between(R, base - R), draws.between(R, base - R), bench.draw_radius(), 0);
+  bench.add_box(base);
+  if (draws.chance(0.3)) bench.add_lid(some_load(bench));
+  if (draws.chance(0.3)) bench.cohesion = bench.weight() * draws.between_decades(1e-2, 1e2);
+}
+
 }  // namespace talus::audit

@@ -39,7 +39,9 @@ constexpr std::array families = {
     SceneFamily{"sticky", "grains that hold one another and their walls", make_sticky},
     SceneFamily{"apart", "two grains that collide far above others, and much faster", make_apart},
     SceneFamily{"touching", "a column, and two grains that collide beside its top and touch it",
-                make_touching}};
+                make_touching},
+    SceneFamily{"clumps", "clumps of balls that lie on one another, or meet in flight", make_clumps},
+    SceneFamily{"rolling", "beams and heaps of grains that resist rolling", make_rolling}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;
@@ -89,11 +91,13 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   stage.time_step = in_cell ? bench.cell_stages.front().time_step : draw_time_step(bench);
   stage.gravity = bench.gravity > 0 ? Vec3(0, 0, -bench.gravity) : Vec3(Vec3::Zero());
   if (in_cell) take_flow(bench.cell_stages.front(), stage);
-  const double friction = draws.chance(0.5) ? 0 : draws.between(0.1, 0.8);
+  const bool smooth = draws.chance(0.5) && bench.rolling == 0;
+  const double friction = smooth ? 0 : draws.between(0.1, 0.8);
   const double at_walls = draws.chance(0.7) ? friction : 0;
   const double restitution = draws.chance(0.6) ? 0 : draws.chance(0.2) ? 1 : draws.unit();
   stage.laws = laws_of_one_material(friction, at_walls, restitution);
   if (bench.cohesion > 0) stage.laws.set_all(cohesion_attraction, bench.cohesion);
+  if (bench.rolling > 0) stage.laws.set_all(&PairLaw::rolling_resistance, bench.rolling);
   scene.common = stage;
   const bool changes = draws.chance(0.5) && settings.steps > 1;
   const int first = changes ? settings.steps / 2 : settings.steps;
@@ -121,6 +125,7 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   scene.setup.seed = bench.made.seed;
   scene.samples.resize(1);
   scene.samples.front().kind = io::SampleSpec::Kind::bodies;
+  scene.samples.front().shape = bench.shape;
   scene.output.every_steps = 1;
   scene.output.sinks = {};
 }

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <unordered_map>
@@ -34,9 +34,6 @@ struct Approach {
 /// Bodies that attract one another touch up to this gap, over the smaller radius.
 constexpr double reach_of_cohesion = 1e-3;
 
-/// Normals of one contact, in the frame's and in the problem's words, differ by less: 1 - cos.
-constexpr double one_normal = 1e-9;
-
 /// Roundings of the largest coordinate that a gap may be of.
 constexpr double roundings_of_gap = 4;
 
@@ -62,13 +59,10 @@ class Builder {
  public:
   explicit Builder(const StepInput& input) : in_(input), n_(input.before.x.size()) {
     const double h = in_.stage.time_step;
-    double smallest = INFINITY;
-    for (double radius : in_.before.radius) smallest = std::min(smallest, radius);
-    numbers_ = {h, in_.setup.detection.alert > 0 ? in_.setup.detection.alert : 0.1 * smallest, 0.5 * smallest,
-                2 * h * in_.stage.gravity.norm(),
-                in_.setup.solver.restitution_law == RestitutionLaw::moreau
-                    ? in_.stage.laws.largest(&PairLaw::restitution)
-                    : 0};
+    numbers_.h = h;
+    numbers_.slow = 2 * h * in_.stage.gravity.norm();
+    if (in_.setup.solver.restitution_law == RestitutionLaw::moreau)
+      numbers_.E = in_.stage.laws.largest(&PairLaw::restitution);
     acts_ = h / (1 + numbers_.E);
     if (in_.after == nullptr) return;
     for (const auto& [a, b] : in_.after->contact_bodies) carry_.insert({a, b});
@@ -79,6 +73,8 @@ class Builder {
     made_.reflection = numbers_.E;
     made_.gravity = in_.stage.gravity;
     take_grains();
+    numbers_.alert = in_.setup.detection.alert > 0 ? in_.setup.detection.alert : 0.1 * smallest_;
+    numbers_.turning = 0.5 * smallest_;
     take_walls();
     take_cell();
     if (made_.cell.repeats)
@@ -103,12 +99,28 @@ class Builder {
       const std::size_t s = slots.at(in_.before.id[k]);
       const double m = in_.bodies.mass(s), R = in_.before.radius[k];
       made_.mass.push_back(m);
-      made_.spin_mobility.push_back(turns ? 2.5 / m : 0);
       made_.free.u.push_back(in_.before.u[k] + acts_ * in_.stage.gravity);
-      made_.free.w.push_back(in_.before.omega.empty() ? Vec3::Zero() : Vec3(R * in_.before.omega[k]));
       middle_.push_back(in_.before.x[k] + numbers_.h / 2 * in_.before.u[k]);
       material_.push_back(in_.bodies.material.empty() ? material_of_grains : in_.bodies.material[s]);
+      const Vec3 omega = in_.before.omega.empty() ? Vec3::Zero() : in_.before.omega[k];
+      if (in_.bodies.shape.empty() || in_.bodies.shape[s] == 0) {
+        made_.spin_mobility.push_back(turns ? 2.5 / m : 0);
+        made_.free.w.push_back(R * omega);
+        balls_.push_back({k, Vec3::Zero(), R});
+        continue;
+      }
+      take_clump(k, sized(in_.setup.clumps[in_.bodies.shape[s] - std::size_t{1}], R), {{}, omega});
     }
+    for (const BallAt& ball : balls_) smallest_ = std::min(smallest_, ball.radius);
+  }
+
+  void take_clump(std::size_t k, const BallBody& body, ClumpTurn turn) {
+    turn.orientation = in_.before.orientation[k];
+    const TurnedClump& clump =
+        made_.clumps.emplace_back(turned_half(body, made_.mass[k], in_.before.radius[k], turn, numbers_.h));
+    made_.spin_mobility.push_back(in_.setup.rotation ? clump.spin_mobility : 0);
+    made_.free.w.push_back(clump.w());
+    for (const Ball& ball : clump.balls) balls_.push_back({k, ball.centre, ball.radius});
   }
 
   void take_walls() {
@@ -147,31 +159,93 @@ class Builder {
     return carry_.contains({id, other}) || carry_.contains({other, id});
   }
 
-  void meet(std::size_t i, std::size_t j) {
+  /// A ball of a body, in the middle of the step; of a sphere it is the sphere.
+  struct BallAt {
+    std::size_t body;
+    Vec3 place;  ///< from the centre of the body [m]
+    double radius;
+  };
+  Vec3 centre(const BallAt& ball) const { return middle_[ball.body] + ball.place; }
+
+  /// B = -[a]x S^-1 of a body at the arm a, omega being S^-1 w.
+  Mat3 lever(std::size_t body, const Vec3& arm) const {
+    const Mat3 turning = made_.clumps[body].lengths.inverse();
+    Mat3 B;
+    for (const Eigen::Index axis : {0, 1, 2}) B.col(axis) = turning.col(axis).cross(arm);
+    return B;
+  }
+
+  /// Of clumps: the arms of both bodies to a point of contact [m].
+  void give_levers(StepContact& contact, const Vec3& point) const {
+    if (made_.clumps.empty()) return;
+    contact.arm = point - middle_[contact.first];
+    contact.levers.emplace();
+    contact.levers->first = lever(contact.first, contact.arm);
+    if (!contact.at_wall()) contact.levers->second = lever(contact.other(), point - middle_[contact.other()]);
+  }
+
+  /// Velocities before the step; those of turns are the free ones.
+  Vec3 velocity_before(const StepContact& contact) const {
+    const std::size_t i = contact.first;
+    Vec3 v = in_.before.u[i];
+    if (!contact.at_wall()) v -= in_.before.u[contact.other()];
+    if (!contact.levers) return v;
+    v += contact.levers->first * made_.free.w[i];
+    if (!contact.at_wall()) v -= contact.levers->second * made_.free.w[contact.other()];
+    return v;
+  }
+
+  void meet(const BallAt& one, const BallAt& other) {
+    const std::size_t i = one.body, j = other.body;
     const StepCell& cell = made_.cell;
-    const Vec3 apart = middle_[i] - middle_[j], k = cell.edges_between(apart),
+    const Vec3 apart = centre(one) - centre(other), k = cell.edges_between(apart),
                d = cell.repeats ? Vec3(apart - cell.edges * k) : apart;
     const double distance = d.norm();
     const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3(Vec3::UnitZ());
-    const double v_n = normal.dot(in_.before.u[i] - in_.before.u[j] - cell.rates * k);
     const PairLaw& pair = law(material_[i], material_[j]);
-    const double gap = distance - in_.before.radius[i] - in_.before.radius[j];
-    const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
-    double bias = 0;
-    const bool closed = closed_in_run(gap, i, in_.before.id[j]);
-    if (!meets(numbers_, {gap, v_n, v_n, closed}, pair.restitution, held.reach, bias)) return;
+    const double gap = distance - one.radius - other.radius;
     const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
-    made_.contacts.push_back({i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction, drift,
-                              d / cell.length, gap <= held.reach ? acts_ * held.force : 0});
+    StepContact contact{i, static_cast<std::ptrdiff_t>(j), normal, 0, pair.friction, drift, d / cell.length};
+    give_levers(contact, centre(one) - (one.radius + gap / 2) * normal);
+    const double v_n = normal.dot(velocity_before(contact) - cell.rates * k);
+    const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
+    const bool closed = closed_in_run(gap, i, in_.before.id[j]);
+    const double reach = held.reach * std::min(one.radius, other.radius);
+    if (!meets(numbers_, {gap, v_n, v_n, closed}, pair.restitution, reach, contact.bias)) return;
+    contact.pull = gap <= reach ? acts_ * held.force : 0;
+    made_.contacts.push_back(contact);
+    const double one_radius = in_.before.radius[i], other_radius = in_.before.radius[j];
+    resist_rolling(contact, pair, {one_radius * other_radius / (one_radius + other_radius), Vec3::Zero()});
   }
 
-  /// How a pair is held together: by so much [N] up to that gap [m].
+  /// Of a contact: its reduced radius [m], and the angular velocity of a wall [rad/s].
+  struct Rolled {
+    double radius;
+    Vec3 omega;
+  };
+  void resist_rolling(const StepContact& contact, const PairLaw& pair, const Rolled& rolled) {
+    if (pair.rolling_resistance == 0 || pair.friction == 0) return;  // smooth contacts do not resist
+    StepContact moment = contact;
+    const Mat3 tangent = Mat3::Identity() - contact.normal * contact.normal.transpose();
+    moment.rolls = rolled.radius;
+    moment.friction = pair.rolling_resistance;
+    moment.bias = moment.pull = 0;
+    moment.branch = Vec3::Zero();
+    moment.drift = rolled.radius * (tangent * rolled.omega);
+    moment.levers.emplace();
+    moment.levers->first = rolled.radius / in_.before.radius[contact.first] * tangent;
+    if (!contact.at_wall())
+      moment.levers->second = rolled.radius / in_.before.radius[contact.other()] * tangent;
+    made_.contacts.push_back(moment);
+  }
+
+  /// How a pair is held together: by so much [N] up to that gap, over the smaller radius.
   struct Holding {
     double force = 0, reach = 0;
   };
   static Holding holding(const PairLaw& pair, double radius, double other) {
     const double force = pair.cohesion_of({radius, other});
-    return {force, force > 0 ? reach_of_cohesion * std::min(radius, other) : 0};
+    return {force, force > 0 ? reach_of_cohesion : 0};
   }
 
   /// Cohesion is a given force: it belongs to what happens without contacts.
@@ -183,8 +257,19 @@ class Builder {
 
   /// All pairs of a cell: an image may be anywhere.
   void meet_images() {
-    for (std::size_t i = 0; i < n_; ++i)
-      for (std::size_t j = 0; j < i; ++j) meet(i, j);
+    for (std::size_t i = 0; i < balls_.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) meet(balls_[i], balls_[j]);
+  }
+
+  /// How far the surface of a ball comes in the step, along a line [m].
+  double reach(const BallAt& ball) const {
+    const double speed = in_.before.u[ball.body].norm() + speed_of_turn(ball);
+    return ball.radius + numbers_.alert + numbers_.h * speed;
+  }
+
+  double speed_of_turn(const BallAt& ball) const {
+    if (made_.clumps.empty()) return 0;
+    return (ball.place.norm() + ball.radius) * in_.before.omega[ball.body].norm();
   }
 
   /// Sort and sweep along the longest axis of the sample.
@@ -193,19 +278,20 @@ class Builder {
     for (const Vec3& x : middle_) low = low.cwiseMin(x), high = high.cwiseMax(x);
     Eigen::Index axis = 0;
     if (n_ > 0) (high - low).maxCoeff(&axis);
-    std::vector<double> reach(n_);
-    std::vector<std::size_t> order(n_);
-    for (std::size_t k = 0; k < n_; ++k) {
-      order[k] = k;
-      reach[k] = in_.before.radius[k] + numbers_.alert + numbers_.h * in_.before.u[k].norm();
-    }
-    const auto begin = [&](std::size_t k) { return middle_[k][axis] - reach[k]; };
+    std::vector<double> far;
+    std::vector<std::size_t> order(balls_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    for (const BallAt& ball : balls_) far.push_back(reach(ball));
+    const auto along = [&](std::size_t k) { return centre(balls_[k])[axis]; };
+    const auto begin = [&](std::size_t k) { return along(k) - far[k]; };
     std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return begin(a) < begin(b); });
-    for (std::size_t a = 0; a < n_; ++a)
-      for (std::size_t b = a + 1; b < n_ && begin(order[b]) <= middle_[order[a]][axis] + reach[order[a]];
+    for (std::size_t a = 0; a < order.size(); ++a)
+      for (std::size_t b = a + 1; b < order.size() && begin(order[b]) <= along(order[a]) + far[order[a]];
            ++b) {
         const auto [j, i] = std::minmax(order[a], order[b]);
-        if ((middle_[i] - middle_[j]).cwiseAbs().maxCoeff() <= reach[i] + reach[j]) meet(i, j);
+        const BallAt &one = balls_[i], &other = balls_[j];
+        if (one.body != other.body && (centre(one) - centre(other)).cwiseAbs().maxCoeff() <= far[i] + far[j])
+          meet(one, other);
       }
   }
 
@@ -214,34 +300,44 @@ class Builder {
       const StepWall wall(in_.walls[w], in_.before.time, numbers_.h);
       if (!wall.there()) continue;
       const Placement middle = wall.placed(numbers_.h / 2);
-      for (std::size_t i = 0; i < n_; ++i) meet_wall(wall, w, middle, i);
+      for (const BallAt& ball : balls_) meet_wall(wall, w, middle, ball);
     }
   }
 
-  void meet_wall(const StepWall& wall, std::size_t w, const Placement& middle, std::size_t i) {
+  void meet_wall(const StepWall& wall, std::size_t w, const Placement& middle, const BallAt& ball) {
+    const std::size_t i = ball.body;
     const PairLaw& pair = law(material_[i], in_.walls[w].material);
-    const double radius = in_.before.radius[i];
-    const Holding held = holding(pair, radius, INFINITY);
+    const Vec3 at = centre(ball);
+    const Holding held = holding(pair, in_.before.radius[i], INFINITY);
     // Of the whole step: free velocities of the problem are the mean ones of an impact.
     const Vec3 gained =
         numbers_.h * (in_.stage.gravity - in_.loads[w] * in_.walls[w].inv_mass() * in_.walls[w].normal);
-    const Vec3 apart = in_.before.u[i] - (wall.moves() ? Vec3(Vec3::Zero()) : in_.walls[w].velocity);
-    const double speed = apart.norm() + gained.norm() + wall.speed_near(middle_[i], radius);
+    const Vec3 of_wall = wall.moves() ? Vec3(Vec3::Zero()) : in_.walls[w].velocity;
+    const double speed = (in_.before.u[i] - of_wall).norm() + speed_of_turn(ball) + gained.norm() +
+                         wall.speed_near(at, ball.radius);
     for (const WallTouch& touch :
-         wall.touches(middle_[i], radius + numbers_.alert + numbers_.h * speed, middle)) {
-      const Vec3 point = middle_[i] - radius * touch.normal;
-      Vec3 drift = wall.material_velocity(point, touch.normal);
-      const double gap = touch.distance - radius, v_n = touch.normal.dot(apart - drift);
+         wall.touches(at, ball.radius + numbers_.alert + numbers_.h * speed, middle)) {
+      const Vec3 point = at - ball.radius * touch.normal;
+      StepContact contact{i,
+                          -1 - static_cast<std::ptrdiff_t>(w),
+                          touch.normal,
+                          0,
+                          pair.friction,
+                          wall.material_velocity(point, touch.normal)};
+      give_levers(contact, point);
+      const double gap = touch.distance - ball.radius,
+                   v_n = touch.normal.dot(velocity_before(contact) - of_wall - contact.drift);
       const bool closed = closed_in_run(gap, i, -1 - static_cast<std::int64_t>(w));
-      double bias = 0;
-      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), closed}, pair.restitution, held.reach,
-                 bias))
+      const double reach = held.reach * ball.radius;
+      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), closed}, pair.restitution, reach,
+                 contact.bias))
         continue;
-      if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, drift.norm());
+      if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, contact.drift.norm());
       // In a cell the material of a wall goes with the flow, in its plane.
-      drift += (made_.cell.before + made_.cell.gain) * (middle_[i] - made_.cell.low);
-      made_.contacts.push_back({i, -1 - static_cast<std::ptrdiff_t>(w), touch.normal, bias, pair.friction,
-                                drift, Vec3::Zero(), gap <= held.reach ? acts_ * held.force : 0});
+      contact.drift += (made_.cell.before + made_.cell.gain) * (middle_[i] - made_.cell.low);
+      contact.pull = gap <= reach ? acts_ * held.force : 0;
+      made_.contacts.push_back(contact);
+      resist_rolling(contact, pair, {in_.before.radius[i], wall.spin()});
     }
   }
 
@@ -251,6 +347,8 @@ class Builder {
   double acts_ = 0;  ///< StepProblem::time_step
   StepProblem made_;
   std::vector<Vec3> middle_;
+  std::vector<BallAt> balls_;   ///< of all bodies
+  double smallest_ = INFINITY;  ///< of their radii [m]
   std::vector<Material> material_;
   std::set<std::array<std::int64_t, 2>> carry_;  ///< pairs of StepInput::after
 };
@@ -265,96 +363,18 @@ void demand_audited(const Setup& setup) {
   const auto refuse = [](const std::string& what) {
     throw std::invalid_argument("the audit knows " + what + "; give it other scenes");
   };
-  if (!setup.clumps.empty()) refuse("spheres only, no clumps");
+  if (!setup.clumps.empty() && setup.domain.repeats) refuse("no clumps in a periodic cell");
   if (!setup.inserts.empty() || !setup.removes.empty()) refuse("no grains that are inserted or removed");
   for (const Wall& wall : setup.walls)
     if (!knows_shape(wall.shape.name)) refuse("no wall like '" + wall.name + "', a " + wall.shape.name);
   for (const Stage& stage : setup.stages)
-    if (stage.laws.largest(&PairLaw::rolling_resistance) > 0) refuse("no rolling resistance");
+    if (!setup.clumps.empty() && stage.laws.largest(&PairLaw::rolling_resistance) > 0)
+      refuse("no rolling resistance of clumps");
 }
 
 StepProblem rebuild_step(const StepInput& input) {
   demand_audited(input.setup);
   return Builder(input).build();
-}
-
-void add_impulse(const StepProblem& problem, const StepContact& contact, const Vec3& r, Motion& motion) {
-  const Vec3 turn = contact.normal.cross(r);
-  motion.u[contact.first] += r / problem.mass[contact.first];
-  motion.w[contact.first] -= problem.spin_mobility[contact.first] * turn;
-  if (contact.at_wall()) {
-    const std::size_t w = contact.wall();
-    const Vec3& n = problem.wall_normal[w];
-    motion.walls[w] -= problem.wall_inv_mass[w] * r.dot(n) * n;
-    return;
-  }
-  motion.u[contact.other()] -= r / problem.mass[contact.other()];
-  motion.w[contact.other()] -= problem.spin_mobility[contact.other()] * turn;
-  if (problem.cell.follows())
-    motion.cell += problem.cell.mobility.cwiseProduct(push_on_cell(r, contact.branch));
-}
-
-Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses) {
-  Motion motion = problem.free;
-  for (std::size_t c = 0; c < impulses.size(); ++c)
-    add_impulse(problem, problem.contacts[c], impulses[c], motion);
-  return motion;
-}
-
-Vec3 relative_velocity(const StepContact& contact, const Motion& motion) {
-  const std::size_t i = contact.first;
-  if (contact.at_wall())
-    return motion.u[i] - motion.walls[contact.wall()] - motion.w[i].cross(contact.normal) - contact.drift;
-  const std::size_t j = contact.other();
-  return motion.u[i] - motion.u[j] - (motion.w[i] + motion.w[j]).cross(contact.normal) - contact.drift +
-         stretched(motion.cell, contact.branch);
-}
-
-double speed_of_bodies(const StepProblem& problem, const StepContact& contact) {
-  const Motion& free = problem.free;
-  const double other = contact.at_wall() ? free.walls[contact.wall()].norm() + contact.drift.norm()
-                                         : free.u[contact.other()].norm();
-  return free.u[contact.first].norm() + other;
-}
-
-namespace {
-
-/// A contact of a frame: what acts on the first of two ids, with the normal from the second to it.
-struct FrameContact {
-  Vec3 normal, impulse;
-  bool known;
-};
-
-}  // namespace
-
-RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
-  std::map<std::array<std::int64_t, 2>, std::vector<FrameContact>> found;
-  for (std::size_t k = 0; k < after.contact_bodies.size(); ++k) {
-    auto [a, b] = after.contact_bodies[k];
-    const bool turned = b >= 0 && a < b;
-    if (turned) std::swap(a, b);
-    const double sign = turned ? -1 : 1;
-    found[{a, b}].push_back(
-        {sign * after.contact_normal[k], sign * problem.time_step * after.contact_force[k], false});
-  }
-  RunImpulses all;
-  for (const StepContact& contact : problem.contacts) {
-    std::int64_t a = after.id[contact.first],
-                 b = contact.at_wall() ? contact.second : after.id[contact.other()];
-    const bool turned = !contact.at_wall() && a < b;
-    if (turned) std::swap(a, b);
-    const double sign = turned ? -1 : 1;
-    all.r.push_back(contact.pull * contact.normal);
-    for (FrameContact& entry : found[{a, b}]) {
-      if (entry.known || !(entry.normal.dot(sign * contact.normal) > 1 - one_normal)) continue;
-      all.r.back() = sign * entry.impulse + contact.pull * contact.normal;
-      entry.known = true;
-      break;
-    }
-  }
-  for (const auto& [ids, entries] : found)
-    all.unknown += static_cast<std::size_t>(std::ranges::count(entries, false, &FrameContact::known));
-  return all;
 }
 
 }  // namespace talus::audit

@@ -5,19 +5,28 @@
 /// what it judges would share its errors.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "apps/study_certificate/step_cell.hpp"
+#include "apps/study_certificate/step_clump.hpp"
 #include "apps/study_certificate/step_walls.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::audit {
 
+/// How the surfaces of two bodies move at a contact: with u + B w.
+struct StepLevers {
+  Mat3 first = Mat3::Zero(), second = Mat3::Zero();  ///< B
+};
+
 /// A pair that may exchange an impulse r [N s], which acts on `first`, and -r on `second`. A grain may touch
-/// a wall in several places.
+/// a wall in several places, and clumps one another. A moment of rolling resistance stands as one more
+/// contact behind that which it belongs to: its r is the moment over the reduced radius l, its velocity l
+/// times the relative angular velocity in the tangent plane, its `friction` mu_r, and it has no normal part.
 struct StepContact {
   std::size_t first = 0;       ///< grain, its place in the frame
   std::ptrdiff_t second = 0;   ///< grain, or -(1 + wall)
@@ -31,14 +40,18 @@ struct StepContact {
   Vec3 branch = Vec3::Zero();
   /// [N s] that cohesion holds with: the law is that of r + pull n, and free motion has -pull n.
   double pull = 0;
+  std::optional<StepLevers> levers = {};  ///< of clumps; those of spheres follow from the normal
+  Vec3 arm = Vec3::Zero();                ///< of clumps: from the centre of the first [m]
+  double rolls = 0;                       ///< of a moment: l [m]; else 0
 
+  bool is_moment() const { return rolls > 0; }
   bool at_wall() const { return second < 0; }
   std::size_t wall() const { return static_cast<std::size_t>(-1 - second); }
   std::size_t other() const { return static_cast<std::size_t>(second); }
 };
 
-/// Velocities of everything: per grain [m/s], w = R omega, and per wall. `cell`: U = d times what the
-/// contacts give the gradient of a cell's flow; grains and walls have theirs without it.
+/// Velocities of everything: per grain [m/s], w = R omega (of a clump TurnedClump::w), and per wall. `cell`:
+/// U = d times what the contacts give the gradient of a cell's flow; grains and walls have theirs without it.
 struct Motion {
   std::vector<Vec3> u, w, walls;
   CellVector cell = CellVector::Zero();
@@ -51,6 +64,7 @@ struct StepProblem {
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
   std::vector<double> mass;           ///< n [kg]
   std::vector<double> spin_mobility;  ///< n, R^2/I [1/kg]; 0 where a grain does not turn
+  std::vector<TurnedClump> clumps;    ///< n where grains are clumps, else none
   Motion free;                        ///< at the end of the step without contacts, but as cohesion pulls
   Motion unpulled;                    ///< and without cohesion
   std::vector<Vec3> wall_normal;      ///< k
@@ -82,8 +96,8 @@ struct StepInput {
   const Frame* after = nullptr;
 };
 
-/// Throws std::invalid_argument for what there are no formulas for: clumps, grains that are inserted or
-/// removed, rolling resistance.
+/// Throws std::invalid_argument for what there are no formulas for: clumps in a periodic cell, grains that
+/// are inserted or removed, rolling resistance of clumps.
 void demand_audited(const Setup& setup);
 
 /// Throws what demand_audited throws.
@@ -95,15 +109,19 @@ void add_impulse(const StepProblem& problem, const StepContact& contact, const V
 /// Velocity at the end of the step under the impulses, one per contact.
 Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses);
 
-/// Relative velocity of a contact, u_1 - u_2 - (w_1 + w_2) x n - drift + U b [m/s].
+/// Of spheres where a contact has none of its own: B w = n x w, and -n x w of the second.
+StepLevers levers_of(const StepContact& contact);
+
+/// Relative velocity of a contact, u_1 - u_2 + B_1 w_1 - B_2 w_2 - drift + U b [m/s].
 Vec3 relative_velocity(const StepContact& contact, const Motion& motion);
 
 /// Speed of both bodies without contacts [m/s], of which the relative velocity is a difference; of a wall
 /// that of its material.
 double speed_of_bodies(const StepProblem& problem, const StepContact& contact);
 
-/// The impulses r + pull n [N s] that the run found, in the order of the problem's contacts, of several at
-/// one wall by their normals; `unknown`: contacts with a force that the problem does not have.
+/// The impulses r + pull n [N s] that the run found, in the order of the problem's contacts, of several of
+/// two bodies by their normals, and by the places of equal ones; `unknown`: contacts with a force that the
+/// problem does not have.
 struct RunImpulses {
   std::vector<Vec3> r;
   std::size_t unknown = 0;

@@ -43,7 +43,7 @@ double drive_at(const StepProblem& problem, const StepContact& contact) {
 std::vector<Vec3> wall_impulses(const StepProblem& problem, std::span<const Vec3> r, bool pressed) {
   std::vector<Vec3> sum(problem.wall_normal.size(), Vec3::Zero());
   for (std::size_t c = 0; c < r.size(); ++c)
-    if (const StepContact& contact = problem.contacts[c]; contact.at_wall())
+    if (const StepContact& contact = problem.contacts[c]; contact.at_wall() && !contact.is_moment())
       sum[contact.wall()] += r[c] - (pressed ? 0 : contact.pull) * contact.normal;
   return sum;
 }
@@ -168,7 +168,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
     else if (problem.wall_inv_mass[contact.wall()] > 0 && set[grains + contact.wall()] == set[contact.first])
       add(grains + contact.wall());
     if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
-    if (contact.at_wall())
+    if (contact.at_wall() && !contact.is_moment())
       own.wall_impulse = std::max(own.wall_impulse, (exact[c] - contact.pull * contact.normal).norm());
     if (exact[c] != Vec3::Zero() || run[c] != Vec3::Zero())
       own.drive = std::max(own.drive, drive_at(problem, contact));
@@ -221,6 +221,7 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   const double exchange = std::max({momentum.all_exchanged(), floors.walls * felt, mass * problem.drive_speed,
                                     floors.motion * mass * speed, floors.held * held, 1e-300});
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+    if (problem.contacts[c].is_moment()) continue;
     contact_unit = std::max(contact_unit, reference.r[c].norm());
     contact_wrong =
         std::max(contact_wrong,
@@ -233,6 +234,30 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   return errors;
 }
 
+namespace {
+
+/// Angular momentum of a clump at the end of the step [kg m^2/s]: what contacts left of it in the middle.
+Vec3 turn_after(const StepProblem& problem, const Frame& after, std::size_t k) {
+  return momentum_of(problem.clumps[k].gyration, problem.mass[k], {after.orientation[k], after.omega[k]});
+}
+
+}  // namespace
+
+std::vector<Vec3> spins_at_end(const StepProblem& problem, const Frame& after) {
+  std::vector<Vec3> w;
+  if (after.omega.empty()) return w;
+  const double E = problem.reflection;
+  for (std::size_t k = 0; k < problem.mass.size(); ++k) {
+    Vec3 end = after.radius[k] * after.omega[k];
+    if (!problem.clumps.empty()) {
+      const TurnedClump& clump = problem.clumps[k];
+      end = clump.lengths * clump.inertia.inverse() * turn_after(problem, after, k);
+    }
+    w.push_back((end + E * problem.free.w[k]) / (1 + E));
+  }
+  return w;
+}
+
 double disagreement(const StepProblem& problem, const StepEnd& end) {
   const Motion motion = motion_under(problem, end.r);
   double impulse = 1e-300, most = 0;
@@ -240,6 +265,10 @@ double disagreement(const StepProblem& problem, const StepEnd& end) {
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
     const double m = problem.mass[k], own = m * (end.after.u[k].norm() + problem.free.u[k].norm());
     most = larger(most, m * (motion.u[k] - end.after.u[k]).norm() / std::max(impulse, own));
+    if (end.w.empty() || problem.spin_mobility[k] == 0) continue;
+    const double J = 1 / problem.spin_mobility[k],
+                 turning = own + J * (end.w[k].norm() + problem.free.w[k].norm());
+    most = larger(most, J * (motion.w[k] - end.w[k]).norm() / std::max(impulse, turning));
   }
   // The cell gains of every contact, and prescribed components nothing.
   double all = 1e-300;
@@ -259,16 +288,21 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
   if (std::ranges::any_of(problem.contacts, [](const StepContact& one) { return one.pull > 0; })) return 0;
   double gained = 0, free = 0, fall = 0;
   const double h = problem.time_step * (1 + problem.reflection);
-  const auto spin = [](const Frame& frame, std::size_t k) {
-    return frame.omega.empty() ? 0.0 : (frame.radius[k] * frame.omega[k]).squaredNorm();
+  const auto turning = [&](const Frame& frame, std::size_t k) {
+    if (frame.omega.empty()) return 0.0;
+    if (problem.clumps.empty())
+      return 0.2 * problem.mass[k] * (frame.radius[k] * frame.omega[k]).squaredNorm();
+    // In the axes of the middle of the step: between contacts the energy is right to second order only.
+    const TurnedClump& clump = problem.clumps[k];
+    return clump.energy(&frame == &before ? clump.momentum : turn_after(problem, after, k));
   };
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    const double m = problem.mass[k], inertia = 0.4 * m;
+    const double m = problem.mass[k];
     // Not from positions: those that `overlap_correction` shifts do not fall or rise by their motion.
     const Vec3 moved = h / 2 * (before.u[k] + after.u[k]);
     gained += 0.5 * m * (after.u[k].squaredNorm() - before.u[k].squaredNorm()) -
-              m * problem.gravity.dot(moved) + 0.5 * inertia * (spin(after, k) - spin(before, k));
-    free += 0.5 * m * problem.free.u[k].squaredNorm() + 0.5 * inertia * spin(before, k);
+              m * problem.gravity.dot(moved) + turning(after, k) - turning(before, k);
+    free += 0.5 * m * problem.free.u[k].squaredNorm() + turning(before, k);
     fall += m * (h * problem.gravity).squaredNorm() / 8;
   }
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;

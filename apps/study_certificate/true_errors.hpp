@@ -29,14 +29,19 @@ struct TrueErrors {
 struct StepEnd {
   const Frame& after;                    ///< in the terms of the problem (end_in_cell)
   std::span<const Vec3> r;               ///< impulses_of
+  std::span<const Vec3> w;               ///< spins_at_end
   CellVector cell = CellVector::Zero();  ///< U of Motion [m/s]
 };
 
+/// w of Motion that the run's grains have in the axes of the middle of the step, in the terms of the problem;
+/// empty without rotation.
+std::vector<Vec3> spins_at_end(const StepProblem& problem, const Frame& after);
+
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end);
 
-/// Largest momentum of a grain that its impulses do not explain, over the largest impulse or its own
-/// momentum: rounding (frames have forces in single precision), unless the run's contacts are not those of
-/// the problem.
+/// Largest momentum of a grain, in its motion or in its turn, that its impulses do not explain, over the
+/// largest impulse or its own momentum: rounding (frames have forces in single precision), unless the run's
+/// contacts are not those of the problem.
 double disagreement(const StepProblem& problem, const StepEnd& end);
 
 /// Energy that a step gained beyond the share that the scheme itself may add, m (h g)^2/8 a grain

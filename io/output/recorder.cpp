@@ -15,6 +15,7 @@ void drop_contacts(Frame& frame) {
   frame.contact_normal.clear();
   frame.contact_gap.clear();
   frame.contact_force.clear();
+  frame.contact_moment.clear();
   frame.with_contacts = false;
 }
 

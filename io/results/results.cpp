@@ -61,6 +61,8 @@ void validate(const Frame& frame, FrameParts parts) {
   demand_same_length(frame.contact_normal.size(), contacts, "contact_normal");
   demand_same_length(frame.contact_gap.size(), contacts, "contact_gap");
   demand_same_length(frame.contact_force.size(), contacts, "contact_force");
+  if (!frame.contact_moment.empty())
+    demand_same_length(frame.contact_moment.size(), contacts, "contact_moment");
 }
 
 namespace {

@@ -60,6 +60,8 @@ void read_contacts(detail::Place group, Frame& frame) {
   frame.contact_normal = read_doubles<Vec3>(h, name, "contacts/normal");
   frame.contact_gap = read_doubles<double>(h, name, "contacts/gap");
   frame.contact_force = read_doubles<Vec3>(h, name, "contacts/force");
+  if (H5Lexists(h, "contacts/moment", H5P_DEFAULT) > 0)
+    frame.contact_moment = read_doubles<Vec3>(h, name, "contacts/moment");
 }
 
 /// Where walls are and how they stand; files of earlier versions do not tell.

@@ -84,9 +84,12 @@ void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::s
     contacts.ry[a] = from[1];
     contacts.rz[a] = from[2];
     if (kind == ImpulseKind::force) continue;
-    contacts.mx[a] = from[3];
-    contacts.my[a] = from[4];
-    contacts.mz[a] = from[5];
+    // The normal has turned since the last step: what of the moment is along it now no law would undo.
+    const Vec3 n(contacts.nx[a], contacts.ny[a], contacts.nz[a]), kept(from[3], from[4], from[5]),
+        m = kept - kept.dot(n) * n;
+    contacts.mx[a] = m[0];
+    contacts.my[a] = m[1];
+    contacts.mz[a] = m[2];
   }
 }
 

@@ -119,7 +119,8 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
 void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                     Candidates& candidates);
 
-/// The inverse: gives the contacts of a chunk the impulses that store_impulses wrote.
+/// The inverse: gives the contacts of a chunk the impulses that store_impulses wrote, and of moments what is
+/// in their tangent planes.
 void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
                       Contacts& contacts);
 

@@ -101,7 +101,7 @@ WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_
   const std::size_t end = begin + static_cast<std::size_t>(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k) {
     if (!contacts.arm.empty()) {
-      const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
+      const Vec3 moment = contact_moment(contacts, k);
       sums.torque += moment;
       if (!contacts.spin.empty()) sums.drift += moment.dot(contacts.spin[k]);
     }

@@ -87,6 +87,10 @@ inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
   if (contacts.cohesion.empty()) return impulse;
   return impulse - contacts.cohesion[k] * contact_normal(contacts, k);
 }
+/// Impulse of the moment of rolling resistance on the first body [N m s], of contacts that have any.
+inline Vec3 contact_moment(const Contacts& contacts, std::size_t k) {
+  return {contacts.mx[k], contacts.my[k], contacts.mz[k]};
+}
 /// Whether a contact carries: r_n > 0, or r_n + c h > 0 with cohesion.
 inline bool is_active(const Contacts& contacts, std::size_t k) {
   return law_impulse(contacts, k).dot(contact_normal(contacts, k)) > 0;

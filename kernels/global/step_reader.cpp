@@ -156,8 +156,7 @@ void StepReader::each_contact(const Visit& visit) const {
 
 Vec3 StepReader::moment_at(std::size_t place) const {
   const Contacts& contacts = source_.contacts;
-  return kept_ != nullptr ? kept_->moment(candidate_at(place))
-                          : Vec3(contacts.mx[place], contacts.my[place], contacts.mz[place]);
+  return kept_ != nullptr ? kept_->moment(candidate_at(place)) : contact_moment(contacts, place);
 }
 
 RollingPart StepReader::rolling_at(std::size_t place) const {

@@ -36,10 +36,6 @@ Rolling rolling_of(const Contacts& contacts, std::size_t k, const Turning& a, co
           contacts.arm[k] * std::max(0.0, law_impulse(contacts, k).dot(n))};
 }
 
-Vec3 moment_of(const Contacts& contacts, std::size_t k) {
-  return {contacts.mx[k], contacts.my[k], contacts.mz[k]};
-}
-
 /// Turns a body by the impulse of a moment [N m s].
 void turn(const Vec3& moment, std::span<const double> radius, std::span<Velocity> velocity, Slot slot) {
   if (slot < 0) return;
@@ -77,7 +73,7 @@ void sweep_moments(Contacts& contacts, ContactRange range, std::span<const doubl
     const Rolling contact =
         rolling_of(contacts, k, turning_of(radius, velocity, first), turning_of(radius, velocity, second));
     if (contact.mobility == 0) continue;
-    const Vec3 before = moment_of(contacts, k), after = solve_rolling(before, contact),
+    const Vec3 before = contact_moment(contacts, k), after = solve_rolling(before, contact),
                change = after - before;
     turn(change, radius, velocity, first);
     turn(-change, radius, velocity, second);
@@ -91,7 +87,7 @@ void add_moments(const Contacts& contacts, ContactRange range, std::span<const d
                  std::span<Velocity> velocity) {
   if (contacts.arm.empty()) return;
   for (std::size_t k = range.begin; k < range.end; ++k) {
-    const Vec3 moment = moment_of(contacts, k);
+    const Vec3 moment = contact_moment(contacts, k);
     turn(moment, radius, velocity, contacts.first[k]);
     turn(-moment, radius, velocity, contacts.second[k]);
   }
@@ -109,7 +105,7 @@ void add_error_of_moments(const Contacts& contacts, ContactRange range, std::spa
     const Turning a = whole(contacts.first[k]), b = whole(contacts.second[k]);
     const Rolling contact = rolling_of(contacts, k, a, b);
     if (contact.mobility == 0) continue;
-    const Vec3 moment = moment_of(contacts, k);
+    const Vec3 moment = contact_moment(contacts, k);
     const double lever = contacts.second[k] < 0 ? a.radius : std::min(a.radius, b.radius);
     const double error = lever * error_of_rolling(moment, contact);
     sums.residual2 += error * error;

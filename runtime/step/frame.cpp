@@ -22,7 +22,7 @@ struct BodyRow {
 };
 struct ContactRow {
   std::int64_t bodies[2];
-  double point[3], normal[3], gap, force[3];
+  double point[3], normal[3], gap, force[3], moment[3];
 };
 
 void copy3(const Vec3& from, double* to) {
@@ -82,7 +82,7 @@ ContactRow contact_row(const StepState& state, const Acting& acting, double impu
   const std::int32_t wall = state.chunks.wall[static_cast<std::size_t>(acting.chunk)];
   const Touch touch = touch_of(poses_of(state), state.contacts, k,
                                wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)]);
-  ContactRow row;
+  ContactRow row{};
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
   row.bodies[1] =
       second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
@@ -90,6 +90,7 @@ ContactRow contact_row(const StepState& state, const Acting& acting, double impu
   copy3(state.domain.wrap(touch.ball.centre - (touch.ball.radius + 0.5 * touch.gap) * normal), row.point);
   row.gap = touch.gap;
   copy3(impulse / impulse_time, row.force);
+  if (!state.contacts.arm.empty()) copy3(contact_moment(state.contacts, k) / impulse_time, row.moment);
   return row;
 }
 
@@ -220,6 +221,8 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   };
   reserve(rows_here(acting.size(), dealing, id_of_first), frame.contact_bodies, frame.contact_normal,
           frame.contact_point, frame.contact_gap, frame.contact_force);
+  // Of the law, as a rank without contacts gets those of others.
+  const bool rolling = state.candidates.impulse.kind() == ImpulseKind::rolling;
   deal_rows(
       acting.size(), dealing, [&](std::size_t k) { return contact_row(state, acting[k], impulse_time); },
       id_of_first,
@@ -229,6 +232,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
         frame.contact_point.push_back(vector_of(row.point));
         frame.contact_gap.push_back(row.gap);
         frame.contact_force.push_back(vector_of(row.force));
+        if (rolling) frame.contact_moment.push_back(vector_of(row.moment));
       });
   release(acting);
   const std::vector<Slot> by_ids =
@@ -238,6 +242,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   permute_in_place(frame.contact_point, by_ids);
   permute_in_place(frame.contact_gap, by_ids);
   permute_in_place(frame.contact_force, by_ids);
+  permute_in_place(frame.contact_moment, by_ids);
 }
 
 }  // namespace talus

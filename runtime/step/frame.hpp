@@ -202,6 +202,7 @@ struct Frame {
   std::vector<Vec3> contact_normal;                         ///< unit, from the second body to the first
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
+  std::vector<Vec3> contact_moment;  ///< of rolling resistance, likewise [N m]; empty where nothing resists
   std::vector<WallReport> walls;
   Domain domain = {};            ///< of the bodies; x and contact_point are wrapped
   std::vector<FieldGrid> grids;  ///< that the scene asks for; none before the first step

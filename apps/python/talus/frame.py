@@ -137,6 +137,11 @@ class Frame:
         return self.array("contacts/force")
 
     @cached_property
+    def moments(self) -> np.ndarray:
+        """Moment of rolling resistance on the first body of each contact, mean over the step [N m]; shape (m, 3)."""
+        return self.array("contacts/moment")
+
+    @cached_property
     def points(self) -> np.ndarray:
         """Points of contact [m]; shape (m, 3)."""
         return self.array("contacts/point")
@@ -221,6 +226,7 @@ _WRITTEN_BY = {
     "cell/edges": " (the scene has no [cell], or the run is of an earlier version)",
     "cell/rates": " (the scene has no [cell], or the run is of an earlier version)",
     "cell/origin": " (the scene has no [cell], or the run is of an earlier version)",
+    "contacts/moment": " (no contact of the scene resists rolling)",
     "contacts/point": " (the scene says output.contact_geometry = false)",
     "contacts/normal": " (the scene says output.contact_geometry = false)",
     "contacts/gap": " (the scene says output.contact_geometry = false)",

@@ -171,10 +171,13 @@ CellColumns::CellColumns(const Domain& domain) {
 std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls, const CellColumns& cell,
                                      const FrameFormat& format, const graph::Communicator& ranks) {
   // Rows of each rank, and whether they have the optional arrays: a rank may have no body.
-  constexpr std::size_t counts = 5;
+  constexpr std::size_t counts = 6;
   const std::int64_t own[counts] = {static_cast<std::int64_t>(part.id.size()),
                                     static_cast<std::int64_t>(part.contact_bodies.size()),
-                                    !part.omega.empty(), !part.orientation.empty(), !part.material.empty()};
+                                    !part.omega.empty(),
+                                    !part.orientation.empty(),
+                                    !part.material.empty(),
+                                    !part.contact_moment.empty()};
   const std::vector<std::int64_t> rows = ranks.gather_records(std::span<const std::int64_t>(own));
   const auto rows_of = [&](std::size_t column) {
     Rows result;
@@ -202,6 +205,7 @@ std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls
     contacts("gap", "m", part.contact_gap);
   }
   contacts("force", "N", part.contact_force);
+  if (rows_of(5).all > 0) contacts("moment", "N m", part.contact_moment);
   const Lister of_walls{arrays, "walls", false, {0, part.walls.size()}};
   of_walls("position", "m", walls.position);
   of_walls("velocity", "m/s", walls.velocity);

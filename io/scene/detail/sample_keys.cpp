@@ -56,7 +56,10 @@ std::vector<Key<SampleSpec>> making_keys() {
              "Each grain is displaced at random, at most by this part of half the gap between two sites.",
              &S::noise)
           .only("kind = lattice", lattice),
-      choice<S>("shape", body_shapes(), &S::shape).only(counted_kinds, counted)};
+      choice<S>("shape", body_shapes(), &S::shape)
+          .only("kind is deposition, lattice, random or bodies",
+                is_kind(
+                    {SampleKind::deposition, SampleKind::lattice, SampleKind::random, SampleKind::bodies}))};
 }
 
 }  // namespace
@@ -214,7 +217,8 @@ Section<SampleSpec> sample_keys() {
       "several. `deposition` lays each grain in the lowest place with three supports, on the floor "
       "between the sides of `base` (Voivret et al. 2007); `lattice` is simple cubic; `bodies` reads a CSV "
       "file with the columns `id,x,y,z,radius`, then perhaps `vx,vy,vz`, then perhaps `wx,wy,wz` (m, m/s, "
-      "rad/s), then perhaps `material`; `state` begins where a run was: spheres with their velocities, "
+      "rad/s), then perhaps `material`; with a `shape` they are clumps of these radii, which are turned at "
+      "random and begin without rotation; `state` begins where a run was: spheres with their velocities, "
       "forces where contacts are, and walls of the same names that have no place of their own; `body` is "
       "one sphere; `random` puts `count` grains at random places of a box or of the periodic cell, each "
       "where it overlaps none, nor a grain of a sample before; samples behind it must leave it room. The "
