@@ -19,15 +19,6 @@ bool turns(const BodyProblem& problem, std::int32_t body) {
   return body >= 0 && inertia(problem.bodies[at(body)]) > 0;
 }
 
-Rolling rolling_at(const BodyProblem& problem, std::size_t k, const Vec3& rate, const Vec3& impulse) {
-  const double r_n = std::max(0.0, problem.contacts[k].normal.dot(impulse));
-  return {rate, rolling_mobility(problem, k), problem.rolling[k].arm * r_n};
-}
-
-Vec3 tangential_spin(const BodyProblem& problem, std::size_t k) {
-  return tangential(problem.contacts[k], problem.rolling[k].spin);
-}
-
 }  // namespace
 
 bool rolls(const BodyProblem& problem, std::size_t k) {
@@ -42,6 +33,15 @@ Vec3 rolling_rate(const BodyProblem& problem, std::size_t k, std::span<const Twi
   if (turns(problem, c.first)) rate += V[at(c.first)].w / problem.bodies[at(c.first)].radius;
   if (turns(problem, c.second)) rate -= V[at(c.second)].w / problem.bodies[at(c.second)].radius;
   return tangential(c, rate);
+}
+
+Vec3 rolling_rate_at(const BodyProblem& problem, std::size_t k, std::span<const Twist> V) {
+  return rolling_rate(problem, k, V) - tangential(problem.contacts[k], problem.rolling[k].spin);
+}
+
+Rolling rolling_at(const BodyProblem& problem, std::size_t k, const Vec3& rate, const Vec3& impulse) {
+  const double r_n = std::max(0.0, problem.contacts[k].normal.dot(impulse));
+  return {rate, rolling_mobility(problem, k), problem.rolling[k].arm * r_n};
 }
 
 bool has_rolling(const BodyProblem& problem) {
@@ -84,8 +84,7 @@ double rolling_residual2(const BodyProblem& problem, std::span<const Vec3> impul
   for (std::size_t k = 0; k < problem.rolling.size(); ++k) {
     if (!rolls(problem, k)) continue;
     const Vec3& m = problem.rolling[k].moment;
-    const Rolling contact =
-        rolling_at(problem, k, rolling_rate(problem, k, V) - tangential_spin(problem, k), impulse[k]);
+    const Rolling contact = rolling_at(problem, k, rolling_rate_at(problem, k, V), impulse[k]);
     sum += (m - solve_rolling(m, contact)).squaredNorm() * contact.mobility;
   }
   return sum;
@@ -139,7 +138,7 @@ RollingSet::RollingSet(const BodyProblem& problem, std::span<const Twist> V) : p
   rate_.assign(n, Vec3::Zero());
   known_ = across_ = change_ = rate_;
   for (std::size_t k = 0; k < n; ++k)
-    if (rolls(problem, k)) rate_[k] = rolling_rate(problem, k, V) - tangential_spin(problem, k);
+    if (rolls(problem, k)) rate_[k] = rolling_rate_at(problem, k, V);
 }
 
 /// m = L d with d = aim/|aim| and aim = m - w/mobility turns, with w, by L/(|aim| - L) dw/mobility across d:

@@ -19,6 +19,12 @@ bool rolls(const BodyProblem& problem, std::size_t k);
 /// left out.
 Vec3 rolling_rate(const BodyProblem& problem, std::size_t k, std::span<const Twist> V);
 
+/// The same with it: that of its material.
+Vec3 rolling_rate_at(const BodyProblem& problem, std::size_t k, std::span<const Twist> V);
+
+/// Contact k under an impulse, where it rolls so fast.
+Rolling rolling_at(const BodyProblem& problem, std::size_t k, const Vec3& rate, const Vec3& impulse);
+
 /// Any contact does.
 bool has_rolling(const BodyProblem& problem);
 
