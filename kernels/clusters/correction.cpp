@@ -217,14 +217,6 @@ class Round {
   FirmContacts firm_;
 };
 
-/// All bodies together, over the least effective mass of a contact.
-double mass_ratio(const BodyProblem& problem) {
-  double all = 0, least = std::numeric_limits<double>::infinity();
-  for (const BodyUnknown& body : problem.bodies) all += body.mass;
-  for (const ContactEquation& c : problem.contacts) least = std::min(least, effective_mass(problem, c));
-  return all / least;
-}
-
 /// Of impulses that are an answer themselves.
 Correction unchanged(const BodyProblem& problem, double at_first) {
   Correction none;
@@ -243,11 +235,24 @@ bool has_friction(const BodyProblem& problem) {
                      [](const ContactEquation& c) { return c.mu > 0; });
 }
 
+double mass_ratio(const BodyProblem& problem) {
+  double all = 0, least = std::numeric_limits<double>::infinity();
+  for (const BodyUnknown& body : problem.bodies) all += body.mass;
+  for (const ContactEquation& c : problem.contacts) least = std::min(least, effective_mass(problem, c));
+  return all / least;
+}
+
 double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change) {
   double largest = 0;
   for (std::size_t k = 0; k < change.size(); ++k)
     largest = larger(largest, (problem.impulse[k] + change[k]).norm());
   return largest;
+}
+
+double carried_by(const BodyProblem& problem, std::span<const Vec3> change) {
+  double sum = 0;
+  for (std::size_t k = 0; k < change.size(); ++k) sum += (problem.impulse[k] + change[k]).norm();
+  return sum;
 }
 
 double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::span<const Vec3> now) {

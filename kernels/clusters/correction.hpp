@@ -31,7 +31,8 @@ struct CorrectionThresholds {
   /// by more.
   double same_forces = 1e-4;
   /// And where no contact has changed its state for more than this part of the largest impulse, in (0, 1): so
-  /// much rounding makes.
+  /// much rounding makes. With friction steps end where the law finds no more wrong than that part of all
+  /// impulses.
   double rounding = 1e-15;
   /// Not where all bodies of the cluster together are so many effective masses of a contact, >> 1: heavier
   /// ones go on where the firm contacts of a round give way, and contacts feel next to nothing of it.
@@ -122,8 +123,14 @@ Correction correction_of(const BodyProblem& problem, double enough,
 /// Some contact has it.
 bool has_friction(const BodyProblem& problem);
 
+/// Mass of all bodies together, over the least effective mass of a contact.
+double mass_ratio(const BodyProblem& problem);
+
 /// The largest impulse of the problem with these changes [N s].
 double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change);
+
+/// Sum of |r| over the contacts with these changes [N s].
+double carried_by(const BodyProblem& problem, std::span<const Vec3> change);
 
 /// By which the changes of impulses differ from those `before`, over the largest impulse, at most.
 double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::span<const Vec3> now);

@@ -320,7 +320,13 @@ class Answers {
       };
       for (const std::size_t c : own_[p]) std::ranges::for_each(groups_[c], add_group);
     });
-    double scale = goal.walls, error = 0;
+    // Where none presses on a wall but by rounding.
+    double scale = larger(goal.walls, largest([](const AnsweredGroup&own) {
+                            const auto at_wall = [](const ContactEquation& k) { return k.wall >= 0; };
+                            const bool touches = std::ranges::any_of(own.group.problem.contacts, at_wall);
+                            return touches ? std::max(own.floor, own.noise) : 0.0;
+                          })),
+           error = 0;
     for (std::size_t w = 0; w < n; ++w) {
       scale = larger(scale, Eigen::Map<const Vec3>(&sum[6 * w]).norm());
       error = larger(error, Eigen::Map<const Vec3>(&sum[6 * w + 3]).norm());

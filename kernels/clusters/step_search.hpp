@@ -75,6 +75,7 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
   best.motion.resize(problem.bodies.size());
   best.open = std::numeric_limits<double>::infinity();
   const bool friction = has_friction(problem);
+  const double apart = mass_ratio(problem), certain = thresholds.certain * asked.enough;
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
   std::vector<Vec3> impulse = best.impulse;
   int wary = 0, idle = 0;
@@ -102,6 +103,13 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     if (!asked.forces) known = known || firmness >= thresholds.firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
+    // Further steps would press rounding, firmness times as large, into redundant contacts.
+    const double wrong = now.open + now.left;
+    if (friction &&
+        (wrong * apart <= certain || wrong <= thresholds.rounding * carried_by(problem, now.impulse))) {
+      now.missed = larger(now.moved, wrong * apart);
+      now.settled = now.missed <= asked.enough;
+    }
     if constexpr (requires { steps.to_come(now, asked, work); })
       if (!now.settled)
         if (const std::optional<double> rest = steps.to_come(now, asked, work)) {
