@@ -63,7 +63,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
     cell = end_in_cell(problem.cell, start.stage.time_step, problem.reflection, start.before, after);
   const Frame mean = mean_of_impact(problem.reflection, start.before, after, cell);
   const std::vector<Vec3> spins = spins_at_end(problem, after);
-  const StepEnd end{mean, run.r, spins, cell.gained};
+  const StepEnd end{mean, run.r, cell.gained, spins};
   step.unexplained = disagreement(problem, end);
   if (run.unknown > 0 || !(step.unexplained <= rounding)) {
     step.judged = Judged::other_problem;

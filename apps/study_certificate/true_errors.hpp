@@ -29,8 +29,8 @@ struct TrueErrors {
 struct StepEnd {
   const Frame& after;                    ///< in the terms of the problem (end_in_cell)
   std::span<const Vec3> r;               ///< impulses_of
-  std::span<const Vec3> w;               ///< spins_at_end
   CellVector cell = CellVector::Zero();  ///< U of Motion [m/s]
+  std::span<const Vec3> w = {};          ///< spins_at_end; empty: not asked
 };
 
 /// w of Motion that the run's grains have in the axes of the middle of the step, in the terms of the problem;

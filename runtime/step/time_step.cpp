@@ -57,8 +57,10 @@ double inverse(double rate) {
 TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver, double smallest,
                                 const TimeStepRule& rule) {
   TimeStepBounds bounds{stage.time_step_max, stage.time_step_min};
+  // A shortest step that is asked for is one that overlaps have to bear.
   if (bounds.longest == 0)
-    bounds.longest = std::sqrt(2 * unseen_overlap(solver, smallest, rule) / stage.gravity.norm());
+    bounds.longest = std::max(bounds.shortest,
+                              std::sqrt(2 * unseen_overlap(solver, smallest, rule) / stage.gravity.norm()));
   if (bounds.shortest == 0) bounds.shortest = bounds.longest / rule.range;
   return bounds;
 }
@@ -112,6 +114,8 @@ void StageClock::choose(double longest) {
   while (level_ < levels_ && std::ldexp(longest_, -level_) > longest) ++level_;
   // At the last level every tick is a multiple.
   while (ticks_ % ticks_of(level_) != 0) ++level_;
+  // An end that has been moved need not be one of them.
+  while (last_ > 0 && level_ < levels_ && ticks_ + ticks_of(level_) > last_) ++level_;
 }
 
 void StageClock::move_end(std::optional<double> end) {

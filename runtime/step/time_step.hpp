@@ -41,7 +41,8 @@ struct TimeStepBounds {
 };
 
 /// Bounds of a stage that chooses its time steps. By default the longest is the time in which a grain falls
-/// by what the overlap tolerance leaves to it. `smallest`: radius [m].
+/// by what the overlap tolerance leaves to it, or the shortest one that the stage asks for if that is longer.
+/// `smallest`: radius [m].
 TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver, double smallest,
                                 const TimeStepRule& rule = {});
 
@@ -82,8 +83,8 @@ class StageClock {
   double time() const;  ///< of the run [s]
   /// Part of the time of the stage that is done; 0 where it has no end by time.
   double fraction() const { return last_ > 0 ? static_cast<double>(ticks_) / static_cast<double>(last_) : 0; }
-  /// Gives the stage, which has begun, another end by time [s] or none. Steps keep their lengths, and the
-  /// last one may go beyond the end.
+  /// Gives the stage, which has begun, another end by time [s] or none. Steps keep their lengths, the last
+  /// ones become shorter, and the stage ends beyond the end by less than the shortest of them.
   void move_end(std::optional<double> end);
 
   /// visit(name, member) for each member of a state, which may be const.

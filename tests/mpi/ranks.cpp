@@ -43,6 +43,7 @@ class Ranks : public OnRanks {
       EXPECT_EQ(a.contact_point, b.contact_point);
       EXPECT_EQ(a.contact_normal, b.contact_normal);
       EXPECT_EQ(a.contact_gap, b.contact_gap);
+      EXPECT_EQ(a.contact_moment, b.contact_moment);
       EXPECT_EQ(a.contact_force, b.contact_force);
       ASSERT_EQ(a.walls.size(), b.walls.size());
       for (std::size_t w = 0; w < a.walls.size(); ++w) EXPECT_EQ(a.walls[w].force, b.walls[w].force);

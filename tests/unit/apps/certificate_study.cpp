@@ -316,12 +316,18 @@ TEST(CertificateStudy, KnowsWhatItHasNoFormulasFor) {
     return true;
   };
   EXPECT_TRUE(known([](talus::Setup&) {}));
-  EXPECT_FALSE(known([](talus::Setup& setup) { setup.clumps.emplace_back(); }));
+  EXPECT_TRUE(known([](talus::Setup& setup) { setup.clumps.emplace_back(); }));
+  EXPECT_FALSE(known([](talus::Setup& setup) {
+    setup.clumps.emplace_back();
+    setup.domain.repeats = true;
+  }));
   EXPECT_FALSE(known([](talus::Setup& setup) { setup.inserts.emplace_back(); }));
   EXPECT_FALSE(known([](talus::Setup& setup) { setup.removes.emplace_back(); }));
   EXPECT_FALSE(known([](talus::Setup& setup) { setup.walls.front().shape.name = "sphere"; }));
-  EXPECT_FALSE(known(
-      [](talus::Setup& setup) { setup.stages.back().laws.set_all(&PairLaw::rolling_resistance, 0.1); }));
+  EXPECT_FALSE(known([](talus::Setup& setup) {
+    setup.clumps.emplace_back();
+    setup.stages.back().laws.set_all(&PairLaw::rolling_resistance, 0.1);
+  }));
 }
 
 TEST(CertificateStudy, RefusesSuchScenesBeforeItWrites) {

@@ -42,6 +42,7 @@ void expect_same(const Frame& a, const Frame& b) {
   EXPECT_TRUE(same_bits(a.contact_normal, b.contact_normal));
   EXPECT_TRUE(same_bits(a.contact_gap, b.contact_gap));
   EXPECT_TRUE(same_bits(a.contact_force, b.contact_force));
+  EXPECT_TRUE(same_bits(a.contact_moment, b.contact_moment));
   ASSERT_EQ(a.walls.size(), b.walls.size());
   for (std::size_t k = 0; k < a.walls.size(); ++k) {
     EXPECT_EQ(a.walls[k].name, b.walls[k].name);
@@ -161,6 +162,20 @@ TEST(Results, ReadBackBitForBit) {
   expect_same(read_frame(scratch / "results.h5", 0), three_grains());
   expect_same(read_frame(scratch / "results.h5", 1), bare);
   expect_same(read_frame(scratch / "results.h5", 2), turned);
+}
+
+TEST(Results, HoldMomentsWhereContactsResistRolling) {
+  const ScratchDirectory scratch;
+  Frame frame = three_grains();
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  writer.append(frame);
+  frame.contact_moment = {Vec3(1e-300, -0.0, 3), Vec3(0, 1.0 / 3, 0)};
+  writer.append(frame);
+  EXPECT_TRUE(read_frame(scratch / "results.h5", 0).contact_moment.empty());
+  expect_same(read_frame(scratch / "results.h5", 1), frame);
+  frame.contact_moment.pop_back();
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { writer.append(frame); }),
+            "frame: contact_moment has 1 entries, expected 2");
 }
 
 TEST(Results, HoldTheCellOfEachFrame) {

@@ -219,6 +219,17 @@ TEST(StepError, OfAWallIsMeasuredByAllThatStandsOnIt) {
   EXPECT_NEAR(step_error(problem, {.enough = 1e-4, .walls = 1000 * whole}).contact, 1, 1e-3);
 }
 
+// A ball that flies along a wall: what rounding makes of the impulse there is no error of the wall's, of
+// which nothing else is. Steps were missed for 10^-24 N s.
+TEST(StepError, OfAWallIsNoMoreThanRoundingWhereNothingPressesOnIt) {
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 1);
+  problem.bodies.back().free.u = Vec3(1, 0, -1e-24);
+  add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
+  problem.impulse.back() = Vec3(0, 0, 3e-25);
+  EXPECT_LT(step_error(problem, {.enough = 1e-4}).wall, 1e-9);
+}
+
 /// Pressed apart by more than its weight asks for, a pair has to open: contacts that would pull are let go.
 TEST(StepError, SeesContactsThatHaveToOpen) {
   BodyProblem problem;
