@@ -180,9 +180,9 @@ TEST(CertificateStudy, GrainsThatResistRollingAreAsWrongAsTheyClaim) {
   for (const std::uint64_t seed : {1, 2, 10, 18, 50, 57, 59, 65, 90}) expect_judged("rolling", seed, {});
 }
 
-// Of 9 scenes 4.6 % of the steps missed once, as rounds for moments did not settle.
+// 4.6 % of the steps of 100 scenes missed once, as rounds for moments did not settle.
 TEST(CertificateStudy, GrainsThatResistRollingMissNoSteps) {
-  for (const std::uint64_t seed : {10, 57, 59, 152}) {
+  for (const std::uint64_t seed : {10, 57, 59, 87, 152}) {
     MadeScene made = make_scene("rolling", seed, {});
     io::place_walls(made.scene, made.grains);
     Bodies bodies;

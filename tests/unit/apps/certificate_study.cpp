@@ -12,7 +12,6 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <regex>
 #include <set>
 
 #include "apps/shared/exit_codes.hpp"
@@ -340,8 +339,9 @@ TEST(CertificateStudy, RefusesSuchScenesBeforeItWrites) {
   options.out = (scratch / "study").string();
   std::ifstream in(file);
   const std::string scene(std::istreambuf_iterator<char>(in), {});
-  io::write_whole(
-      file, std::regex_replace(scene, std::regex("rolling_resistance = 0.0"), "rolling_resistance = 0.1"));
+  io::write_whole(file, scene +
+                            "\n[[remove]]\nname = \"out\"\n"
+                            "region = { shape = \"box\", low = [9, 9, 9], high = [10, 10, 10] }\n");
   EXPECT_EQ(study_certificate_command(options), exit_bad_input);
   EXPECT_FALSE(std::filesystem::exists(options.out));
   io::write_whole(file, scene);
