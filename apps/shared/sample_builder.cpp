@@ -125,14 +125,14 @@ void set_velocity(const io::SampleSpec& spec, Sample& sample) {
 Sample make_part(const io::Scene& scene, std::size_t k, std::span<const Sample> before) {
   using Kind = io::SampleSpec::Kind;
   const io::SampleSpec& spec = scene.samples[k];
-  Sample sample;
-  if (spec.kind == Kind::bodies)
-    sample = io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
+  const bool given = spec.kind == Kind::bodies;
+  Sample sample =
+      given ? io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials) : Sample{};
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;
   if (!scene.setup.clumps.empty()) sample.shape = mass_of(1, scene.setup.clumps.front());
   sample.seed = scene.setup.seed;
-  if (spec.kind == Kind::bodies) return sample;
+  if (given) return sample;
   const auto stream = static_cast<std::uint32_t>(k);
   const auto draw = [&](std::size_t n) { return draw_radii(spec.radii, n, scene.setup.seed, stream); };
   if (spec.kind == Kind::body) {

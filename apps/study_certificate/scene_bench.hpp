@@ -22,7 +22,7 @@ class SceneBench {
   double speed = 0;                     ///< [m/s] that grains have at the beginning
   double wall_speed = 0;                ///< [m/s] of walls that move by themselves, the largest
   double cohesion = 0;                  ///< [N] of all pairs
-  double rolling = 0;                   ///< rolling resistance of all pairs; then they have friction
+  double rolling = 0;                   ///< rolling resistance of all pairs; then grains have friction
   BodyShape shape = BodyShape::sphere;  ///< of all grains
   int size;                             ///< MakerSettings::size
   int steps;

@@ -111,6 +111,8 @@ class Builder {
       }
       take_clump(k, sized(in_.setup.clumps[in_.bodies.shape[s] - std::size_t{1}], R), {{}, omega});
     }
+    if (!made_.clumps.empty() && made_.clumps.size() != n_)
+      throw std::invalid_argument("the audit knows grains of one shape; give it other scenes");
     for (const BallAt& ball : balls_) smallest_ = std::min(smallest_, ball.radius);
   }
 

@@ -170,7 +170,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
     if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
     if (contact.at_wall() && !contact.is_moment())
       own.wall_impulse = std::max(own.wall_impulse, (exact[c] - contact.pull * contact.normal).norm());
-    if (exact[c] != Vec3::Zero() || run[c] != Vec3::Zero())
+    if (!contact.is_moment() && (exact[c] != Vec3::Zero() || run[c] != Vec3::Zero()))
       own.drive = std::max(own.drive, drive_at(problem, contact));
   }
   double worst = 0;

@@ -255,6 +255,15 @@ double carried_by(const BodyProblem& problem, std::span<const Vec3> change) {
   return sum;
 }
 
+double beyond_rounding(const BodyProblem& problem, const Correction& step, double enough,
+                       const CorrectionThresholds& thresholds) {
+  const double wrong = step.open + step.left, apart = mass_ratio(problem);
+  if (wrong * apart <= thresholds.certain * enough) return wrong * apart;
+  const double carried = carried_by(problem, step.impulse);
+  return wrong <= thresholds.rounding * carried ? std::sqrt(apart * wrong * carried)
+                                                : std::numeric_limits<double>::infinity();
+}
+
 double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::span<const Vec3> now) {
   double most = 0;
   for (std::size_t k = 0; k < now.size(); ++k) most = larger(most, (now[k] - before[k]).norm());

@@ -132,6 +132,14 @@ double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change)
 /// Sum of |r| over the contacts with these changes [N s].
 double carried_by(const BodyProblem& problem, std::span<const Vec3> change);
 
+/// What may still be wrong with the momentum behind a step, whose impulses meet the law to rounding or as
+/// CorrectionThresholds::certain says [N s]; infinite where they do not. Further steps would press rounding,
+/// firmness times as large, into redundant contacts. Where a residual e of the law is rounding of impulses r,
+/// its motion has an energy of e r over the least effective mass at most, as the law is monotone but for
+/// friction: momenta up to (M/m e r)^1/2.
+double beyond_rounding(const BodyProblem& problem, const Correction& step, double enough,
+                       const CorrectionThresholds& thresholds);
+
 /// By which the changes of impulses differ from those `before`, over the largest impulse, at most.
 double pushed_by(const BodyProblem& problem, std::span<const Vec3> before, std::span<const Vec3> now);
 

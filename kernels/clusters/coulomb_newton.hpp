@@ -48,10 +48,11 @@ struct CoulombThresholds {
 ///   M d = H (r(d) - r),   r(d) = P(t - rho (v + H^T d)),   rho: firmness / W_nn and firmness / W_tt,
 ///
 /// P the projection on r_n >= 0 and then on the disc |r_t| <= mu r_n (Alart and Curnier 1991): contacts that
-/// yield in proportion to what pushes them beyond t. r(d) is the next t; where d no longer changes the law
-/// holds. Newton's method solves it, by matrices M + H P' rho H^T, which are not symmetric. Unlike the convex
-/// problem of proximal_newton.hpp it need not have one solution, and a line search may come to a stop: then
-/// the step is taken back and made softer.
+/// yield in proportion to what pushes them beyond t. Moments m of contacts that resist rolling are unknowns
+/// likewise, with rho: firmness over 1/I_1 + 1/I_2, and |m| <= a r_n(d) (kernels/law/rolling_law.hpp). r(d)
+/// is the next t; where d no longer changes the law holds. Newton's method solves it, by matrices M + H P'
+/// rho H^T, which are not symmetric. Unlike the convex problem of proximal_newton.hpp it need not have one
+/// solution, and a line search may come to a stop: then the step is taken back and made softer.
 Correction coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
                               const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
                               double& work);

@@ -24,7 +24,8 @@ CoulombStep::CoulombStep(const BodyProblem& problem)
 /// And the masses that a contact feels along its normal and across it, 1/W_nn and 1/W_tt.
 void CoulombStep::add_columns(std::size_t k) {
   const ContactEquation& c = problem_.contacts[k];
-  Columns columns{};
+  Columns columns;
+  for (auto& turns : columns.turns) turns.setZero();
   columns.rolls = rolls(problem_, k);
   Mat3 W = Mat3::Zero();
   for (int axis = 0; axis < 3; ++axis) {
@@ -113,7 +114,7 @@ CoulombStep::Vector CoulombStep::residual(const Vector& d, const CoulombStart& s
   Vector f = mass_.cwiseProduct(d);
   for (std::size_t k = 0; k < columns_.size(); ++k) {
     const Carried now = carried(k, d, start);
-    const Vec3 moment = columns_[k].rolls ? Vec3(problem_.rolling[k].moment - now.m) : now.m;
+    const Vec3 moment = columns_[k].rolls ? Vec3(problem_.rolling[k].moment - now.m) : Vec3(Vec3::Zero());
     add_force(k, {problem_.impulse[k] - now.r, moment}, f);
   }
   return f;

@@ -70,7 +70,7 @@ class CoulombStep {
     Freedoms::Column blocks;  ///< which ones: values are those of x
     std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>> H;
     bool rolls = false;
-    std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>> turns;  ///< if it rolls
+    std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>> turns;  ///< 0 if it does not
   };
   /// P' rho: of the impulse, of the moment by what moves the impulse, and by the rate of rolling.
   struct Slope {

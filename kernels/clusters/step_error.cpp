@@ -289,6 +289,13 @@ class Answers {
     if (change == 0) return 0;
     return change / std::max({largest_impulse(own.group.problem, own.answer.found), own.floor, own.noise});
   }
+  /// What is done elsewhere, or rounding, makes of the momentum of a group beside a wall: the largest [N s].
+  double least_at_walls() const {
+    return largest([](const AnsweredGroup& own) {
+      const auto at_wall = [](const ContactEquation& k) { return k.wall >= 0; };
+      return std::ranges::any_of(own.group.problem.contacts, at_wall) ? std::max(own.floor, own.noise) : 0.0;
+    });
+  }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least
   /// ErrorGoal::walls: the largest.
   double wall_error(const ErrorGoal& goal) const {
@@ -320,13 +327,7 @@ class Answers {
       };
       for (const std::size_t c : own_[p]) std::ranges::for_each(groups_[c], add_group);
     });
-    // Where none presses on a wall but by rounding.
-    double scale = larger(goal.walls, largest([](const AnsweredGroup&own) {
-                            const auto at_wall = [](const ContactEquation& k) { return k.wall >= 0; };
-                            const bool touches = std::ranges::any_of(own.group.problem.contacts, at_wall);
-                            return touches ? std::max(own.floor, own.noise) : 0.0;
-                          })),
-           error = 0;
+    double scale = larger(goal.walls, least_at_walls()), error = 0;
     for (std::size_t w = 0; w < n; ++w) {
       scale = larger(scale, Eigen::Map<const Vec3>(&sum[6 * w]).norm());
       error = larger(error, Eigen::Map<const Vec3>(&sum[6 * w + 3]).norm());

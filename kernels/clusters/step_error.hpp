@@ -41,8 +41,10 @@ struct StepErrorThresholds {
 /// Distance of what the impulses of a step give from a solution of it, relative.
 struct StepError {
   double velocity = 0;  ///< of the worst group: sum m |V(r) - V*| over its scale
-  double wall = 0;  ///< of the worst wall: its impulse, over the largest impulse of a wall, or what rounding
-                    ///< leaves of the momentum of a group beside one; the faces of a cell are walls
+  /// Of the worst wall: its impulse, over the largest impulse of a wall, or what rounding or other groups
+  /// (StepErrorThresholds::elsewhere) make of the momentum of a group beside one; the faces of a cell are
+  /// walls.
+  double wall = 0;
   double contact = 0;    ///< of the worst contact: its impulse, over the largest of its group
   PartImpulses change;   ///< of r, per part and contact, that mends it as far as answers help [N s]
   PartImpulses moments;  ///< likewise of moments of rolling resistance [N m s]

@@ -28,6 +28,7 @@ struct SearchThresholds {
   /// Momentum may be off by this part of the goal behind a step, in (0, 1).
   double inner = 1e-2;
   /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
+  /// (With friction one may that leaves nothing but rounding: beyond_rounding.)
   /// And what further steps would change, by how the last two did, may be so many goals, >= 1.
   double firm_enough = 1e6, rest = 10;
   /// With friction a search ends after so many steps of the greatest firmness, >= 1, that move no more than
@@ -75,7 +76,6 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
   best.motion.resize(problem.bodies.size());
   best.open = std::numeric_limits<double>::infinity();
   const bool friction = has_friction(problem);
-  const double apart = mass_ratio(problem), certain = thresholds.certain * asked.enough;
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
   std::vector<Vec3> impulse = best.impulse;
   int wary = 0, idle = 0;
@@ -103,13 +103,12 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     if (!asked.forces) known = known || firmness >= thresholds.firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
-    // Further steps would press rounding, firmness times as large, into redundant contacts.
-    const double wrong = now.open + now.left;
-    if (friction &&
-        (wrong * apart <= certain || wrong <= thresholds.rounding * carried_by(problem, now.impulse))) {
-      now.missed = larger(now.moved, wrong * apart);
-      now.settled = now.missed <= asked.enough;
-    }
+    if (friction && !now.settled)
+      if (const double rest = larger(now.moved, beyond_rounding(problem, now, asked.enough, thresholds));
+          rest <= asked.enough) {
+        now.missed = rest;
+        now.settled = true;
+      }
     if constexpr (requires { steps.to_come(now, asked, work); })
       if (!now.settled)
         if (const std::optional<double> rest = steps.to_come(now, asked, work)) {

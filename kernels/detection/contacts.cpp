@@ -84,9 +84,19 @@ void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::s
     contacts.ry[a] = from[1];
     contacts.rz[a] = from[2];
     if (kind == ImpulseKind::force) continue;
-    // The normal has turned since the last step: what of the moment is along it now no law would undo.
-    const Vec3 n(contacts.nx[a], contacts.ny[a], contacts.nz[a]), kept(from[3], from[4], from[5]),
-        m = kept - kept.dot(n) * n;
+    contacts.mx[a] = from[3];
+    contacts.my[a] = from[4];
+    contacts.mz[a] = from[5];
+  }
+}
+
+void turn_moments(const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+  if (contacts.mx.empty()) return;
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
+  const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  for (std::size_t a = begin; a < end; ++a) {
+    const Vec3 n(contacts.nx[a], contacts.ny[a], contacts.nz[a]),
+        kept(contacts.mx[a], contacts.my[a], contacts.mz[a]), m = kept - kept.dot(n) * n;
     contacts.mx[a] = m[0];
     contacts.my[a] = m[1];
     contacts.mz[a] = m[2];

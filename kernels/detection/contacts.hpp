@@ -119,10 +119,12 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
 void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                     Candidates& candidates);
 
-/// The inverse: gives the contacts of a chunk the impulses that store_impulses wrote, and of moments what is
-/// in their tangent planes.
+/// The inverse: gives the contacts of a chunk the impulses that store_impulses wrote.
 void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
                       Contacts& contacts);
+/// Drops what the moments of a chunk, which the step before has left, have along normals that have turned
+/// since: no law would undo it. Once a step, as doing it twice would change bits.
+void turn_moments(const Chunks& chunks, std::size_t chunk, Contacts& contacts);
 
 /// Converts the impulses to `kind` when a stage brings friction or drops it, so that forces outlive the
 /// change: normal parts become vectors along the present normals, and vectors their normal parts. x [m] of

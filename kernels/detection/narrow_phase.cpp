@@ -223,6 +223,7 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
     narrow_surface(phase, contacts);
   set_friction(candidates, chunks, chunk, materials_of(in), in.laws, contacts);
   restore_impulses(candidates, chunks, chunk, contacts);
+  turn_moments(chunks, chunk, contacts);
 }
 
 }  // namespace talus

@@ -219,10 +219,12 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
     return static_cast<std::int64_t>(
         state.bodies.id[static_cast<std::size_t>(state.contacts.first[contact])]);
   };
-  reserve(rows_here(acting.size(), dealing, id_of_first), frame.contact_bodies, frame.contact_normal,
-          frame.contact_point, frame.contact_gap, frame.contact_force);
+  const std::size_t rows = rows_here(acting.size(), dealing, id_of_first);
+  reserve(rows, frame.contact_bodies, frame.contact_normal, frame.contact_point, frame.contact_gap,
+          frame.contact_force);
   // Of the law, as a rank without contacts gets those of others.
   const bool rolling = state.candidates.impulse.kind() == ImpulseKind::rolling;
+  if (rolling) frame.contact_moment.reserve(rows);
   deal_rows(
       acting.size(), dealing, [&](std::size_t k) { return contact_row(state, acting[k], impulse_time); },
       id_of_first,

@@ -50,3 +50,10 @@ def heap():
 @pytest.fixture(scope="session")
 def heap_run(tmp_path_factory):
     return talus.run(copy.deepcopy(HEAP), tmp_path_factory.mktemp("runs") / "heap", threads=1, progress=False)
+
+
+@pytest.fixture(scope="session")
+def rolling_run(tmp_path_factory):
+    scene = copy.deepcopy(HEAP)
+    scene["material"]["rolling_resistance"] = 0.1
+    return talus.run(scene, tmp_path_factory.mktemp("runs") / "rolling", threads=1, progress=False)

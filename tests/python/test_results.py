@@ -43,6 +43,15 @@ def test_forces_of_contacts_add_up_to_those_of_the_walls(heap_run):
         assert np.allclose(total, wall["force"], rtol=1e-9, atol=1e-9 * np.abs(frame.forces).max()), wall["name"]
 
 
+def test_moments_are_there_where_contacts_resist_rolling(rolling_run, heap_run):
+    frame = rolling_run.frame(-1)
+    assert frame.moments.shape == frame.forces.shape and np.abs(frame.moments).max() > 0
+    assert np.abs(np.einsum("ij,ij->i", frame.moments, frame.normals)).max() <= 1e-12 * np.abs(frame.moments).max()
+    assert rolling_run.frame(0).moments.shape == (0, 3)
+    with pytest.raises(talus.MissingData):
+        heap_run.frame(-1).moments
+
+
 def test_contacts_touch_where_positions_radii_and_normals_say(heap_run):
     frame = heap_run.frame(-1)
     pairs = frame.contacts[frame.between_grains]

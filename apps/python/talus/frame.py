@@ -139,6 +139,8 @@ class Frame:
     @cached_property
     def moments(self) -> np.ndarray:
         """Moment of rolling resistance on the first body of each contact, mean over the step [N m]; shape (m, 3)."""
+        if len(self.contacts) == 0:
+            return np.zeros((0, 3))
         return self.array("contacts/moment")
 
     @cached_property

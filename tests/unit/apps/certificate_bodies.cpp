@@ -11,6 +11,7 @@
 #include "apps/study_certificate/audited_run.hpp"
 #include "apps/study_certificate/scene_maker.hpp"
 #include "apps/study_certificate/step_clump.hpp"
+#include "io/files/output_directory.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/shapes/body_shapes.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
@@ -147,6 +148,45 @@ TEST(CertificateReference, ABallThatResistsRollingRestsUpToTheAngleOfRolling) {
     const double m = angle < limit ? -std::sin(angle) : -resistance * std::cos(angle);
     ASSERT_EQ(answer.exact.size(), 2u);
     EXPECT_NEAR(answer.exact[1][1], m * problem.mass[0] * g * h, 1e-6 * problem.mass[0] * g * h) << angle;
+  }
+}
+
+// Held by friction and a large moment, it goes with a plane that turns about a line in it.
+TEST(CertificateReference, ABallThatAPlaneTakesAlongTurnsWithIt) {
+  constexpr double rate = 3;
+  Step step(1e3, {0, 0, -100 * g});
+  step.stage.laws.set_all(&PairLaw::rolling_resistance, 1e3);
+  step.setup.walls[0].motion = {rotation_part(Vec3::UnitY(), Vec3::Zero(), rate)};
+  step.ball({0, 0, R});
+  const StepProblem problem = step.problem();
+  ASSERT_EQ(problem.contacts.size(), 2u);
+  const Reference answer = solved(problem);
+  ASSERT_EQ(answer.found, Found::answer);
+  EXPECT_NEAR(answer.motion.w[0][1], R * rate, 1e-2 * R * rate);
+  EXPECT_NEAR(answer.motion.u[0][0], R * rate, 1e-2 * R * rate);
+}
+
+// The places and sizes of a file; turned at random, which the file cannot tell yet.
+TEST(CertificateStudy, ClumpsComeFromAFileOfPlaces) {
+  const test::ScratchDirectory scratch;
+  const MadeScene made = make_scene("clumps", 4, {});
+  keep_scene(made, scratch.path());
+  const io::Scene scene = io::load_scene((scratch / (made.scene.name + ".toml")).string(), {});
+  const Sample sample = build_sample(scene);
+  EXPECT_EQ(sample.shape.number, 1);
+  EXPECT_TRUE(std::ranges::equal(sample.x, made.grains.x));
+  Bodies read, own;
+  append(sample, read);
+  append(made.grains, own);
+  EXPECT_EQ(digest(read), digest(own));
+  const std::string csv = "id,x,y,z,radius,vx,vy,vz,wx,wy,wz\n0,0,0,1,0.1,0,0,0,1,0,0\n";
+  io::write_whole(scratch / (made.scene.name + ".csv"), csv);
+  try {
+    build_sample(scene);
+    FAIL() << "a clump that spins at first";
+  } catch (const io::SceneError& error) {
+    EXPECT_NE(std::string(error.what()).find("clumps begin without rotation"), std::string::npos)
+        << error.what();
   }
 }
 

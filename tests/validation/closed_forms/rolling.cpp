@@ -141,7 +141,7 @@ TEST(RollingResistance, MomentsLieInTheTangentPlanes) {
   scene.friction(1);
   scene.stage().laws.set_all(cohesion_attraction, 3e3);
   scene.stage().laws.set_all(&PairLaw::rolling_resistance, 1e-2);  // too little: it bends
-  for (int k = 0; k < 8; ++k) scene.sphere({(2 * k + 1) * radius, 0, 0}, radius, 2);
+  for (int k = 0; k < 8; ++k) scene.sphere({(2 * k + 1) * radius, 0, 0}, radius, 2, Vec3(0, 0.1 * k, 0));
   Experiment run(std::move(scene));
   run.steps(50);
   const Frame frame = run.simulation().frame();
