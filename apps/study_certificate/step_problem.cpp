@@ -270,7 +270,7 @@ class Builder {
   }
 
   double speed_of_turn(const BallAt& ball) const {
-    if (made_.clumps.empty()) return 0;
+    if (made_.clumps.empty() || in_.before.omega.empty()) return 0;
     return (ball.place.norm() + ball.radius) * in_.before.omega[ball.body].norm();
   }
 

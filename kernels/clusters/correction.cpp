@@ -217,6 +217,13 @@ class Round {
   FirmContacts firm_;
 };
 
+/// Sum of |r| over the contacts with these changes [N s].
+double carried_by(const BodyProblem& problem, std::span<const Vec3> change) {
+  double sum = 0;
+  for (std::size_t k = 0; k < change.size(); ++k) sum += (problem.impulse[k] + change[k]).norm();
+  return sum;
+}
+
 /// Of impulses that are an answer themselves.
 Correction unchanged(const BodyProblem& problem, double at_first) {
   Correction none;
@@ -247,12 +254,6 @@ double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change)
   for (std::size_t k = 0; k < change.size(); ++k)
     largest = larger(largest, (problem.impulse[k] + change[k]).norm());
   return largest;
-}
-
-double carried_by(const BodyProblem& problem, std::span<const Vec3> change) {
-  double sum = 0;
-  for (std::size_t k = 0; k < change.size(); ++k) sum += (problem.impulse[k] + change[k]).norm();
-  return sum;
 }
 
 double beyond_rounding(const BodyProblem& problem, const Correction& step, double enough,

@@ -129,9 +129,6 @@ double mass_ratio(const BodyProblem& problem);
 /// The largest impulse of the problem with these changes [N s].
 double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change);
 
-/// Sum of |r| over the contacts with these changes [N s].
-double carried_by(const BodyProblem& problem, std::span<const Vec3> change);
-
 /// What may still be wrong with the momentum behind a step, whose impulses meet the law to rounding or as
 /// CorrectionThresholds::certain says [N s]; infinite where they do not. Further steps would press rounding,
 /// firmness times as large, into redundant contacts. Where a residual e of the law is rounding of impulses r,

@@ -114,6 +114,19 @@ TEST(CertificateReference, EachBallOfADumbbellOnAFloorCarriesHalfOfIt) {
   }
 }
 
+TEST(CertificateReference, ADumbbellThatMayNotTurnRestsOnItsBallsTogether) {
+  Step step(0.5);
+  step.dumbbell({0, 0, R / 2});
+  step.setup.rotation = false;
+  step.before.omega.clear();
+  const StepProblem problem = step.problem();
+  const Reference answer = solved(problem);
+  ASSERT_EQ(answer.found, Found::answer);
+  ASSERT_EQ(answer.exact.size(), 2u);
+  EXPECT_NEAR(answer.exact[0][2] + answer.exact[1][2], problem.mass[0] * g * h,
+              1e-6 * problem.mass[0] * g * h);
+}
+
 // It falls on one end: r (1/m + a^2/I) = v with a = R/2 the arm and I = 1.4 m (R/2)^2, so r = v m 1.4/2.4.
 TEST(CertificateReference, ADumbbellThatFallsOnOneEndTurns) {
   constexpr double v = 1;
