@@ -126,16 +126,16 @@ TEST_F(Resume, BeforeTheTimeIsUp) {
 // A run of three days (docs/tutorial.md), in small: the same line again and again until it is done.
 TEST_F(Resume, IsTheSameLineUntilItIsDone) {
   const std::string line =
-      "run scene.toml --out days --resume --set stage.shear.end.steps=200 --set allow_unconverged=true "
+      "run scene.toml --out days --resume --set stage.shear.end.steps=100 --set allow_unconverged=true "
       "--threads 1";
-  ASSERT_EQ(run("run scene.toml --out straight --set stage.shear.end.steps=200 --set allow_unconverged=true "
+  ASSERT_EQ(run("run scene.toml --out straight --set stage.shear.end.steps=100 --set allow_unconverged=true "
                 "--threads 1")
                 .code,
             0);
   int runs = 0;
   for (int code = 75; code == 75; ++runs) {
     ASSERT_LT(runs, 200);
-    const Outcome part = run(line + " --max-walltime 0:02");
+    const Outcome part = run(line + " --max-walltime 0:01");
     code = part.code;
     ASSERT_TRUE(code == 0 || code == 75) << part.messages;
   }
@@ -150,13 +150,13 @@ TEST_F(Resume, IsTheSameLineUntilItIsDone) {
   EXPECT_EQ(files_below(at("days")), before);
   // Further than it was meant to go.
   const Outcome further =
-      run("run scene.toml --out days --resume --set stage.shear.end.steps=210 --set allow_unconverged=true "
+      run("run scene.toml --out days --resume --set stage.shear.end.steps=110 --set allow_unconverged=true "
           "--threads 1");
   EXPECT_EQ(further.code, 0) << further.messages;
-  EXPECT_EQ(summary(at("days")).at("steps"), 216);
+  EXPECT_EQ(summary(at("days")).at("steps"), 116);
   const auto json = nlohmann::json::parse(content(at("days/run.json")));
   EXPECT_EQ(json.at("provenance").at("resumed").back().at("changes").front(),
-            "stage.shear.end.steps was 200 and is 210");
+            "stage.shear.end.steps was 100 and is 110");
 }
 
 // An end moved before where the run is, and back to where it was at the checkpoint.
