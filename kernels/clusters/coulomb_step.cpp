@@ -11,6 +11,18 @@
 
 namespace talus {
 
+namespace {
+
+/// H^T d of the columns H of a contact.
+Vec3 seen_by(const Freedoms::Column& blocks, const ContactColumns& H, const Eigen::VectorXd& d) {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t b = 0; b < H.size(); ++b)
+    sum += H[b].topRows(blocks[b].count).transpose() * d.segment(blocks[b].begin, blocks[b].count);
+  return sum;
+}
+
+}  // namespace
+
 CoulombStep::CoulombStep(const BodyProblem& problem)
     : problem_(problem), freedoms_(problem), mass_(freedoms_.masses()) {
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
@@ -60,7 +72,7 @@ double CoulombStep::wrong(std::size_t k, const Vector& d, const Carried& carried
   const double force = (carried.r - map.carried).norm();
   if (!columns_[k].rolls) return force;
   const Rolling contact = rolling_at(problem_, k, rate(k, d), carried.r);
-  return force + (carried.m - solve_rolling(carried.m, contact)).norm() / rolling_lever(problem_, k);
+  return force + wrong_moment(problem_, k, carried.m, contact);
 }
 
 Vec3 CoulombStep::force(std::size_t k, const Vector& d, const CoulombStart& start, Mat3* slope) const {
@@ -213,22 +225,12 @@ CoulombStep::Vector CoulombStep::product(const std::vector<Slope>& slope, const 
 
 /// H^T d of a contact.
 Vec3 CoulombStep::change(std::size_t k, const Vector& d) const {
-  Vec3 change = Vec3::Zero();
-  const Columns& own = columns_[k];
-  for (std::size_t b = 0; b < own.H.size(); ++b)
-    change += own.H[b].topRows(own.blocks[b].count).transpose() *
-              d.segment(own.blocks[b].begin, own.blocks[b].count);
-  return change;
+  return seen_by(columns_[k].blocks, columns_[k].H, d);
 }
 
 /// The same of its moment [rad/s].
 Vec3 CoulombStep::turning(std::size_t k, const Vector& d) const {
-  Vec3 rate = Vec3::Zero();
-  const Columns& own = columns_[k];
-  for (std::size_t b = 0; b < own.turns.size(); ++b)
-    rate += own.turns[b].topRows(own.blocks[b].count).transpose() *
-            d.segment(own.blocks[b].begin, own.blocks[b].count);
-  return rate;
+  return seen_by(columns_[k].blocks, columns_[k].turns, d);
 }
 
 }  // namespace talus

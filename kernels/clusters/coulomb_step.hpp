@@ -27,6 +27,10 @@ struct CoulombStart {
   double firmness = 0;
 };
 
+/// What impulses along x, y and z at a contact, or moments about them, do to the blocks of freedoms that it
+/// touches.
+using ContactColumns = std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>>;
+
 /// What steps have still to change.
 struct LinearRest {
   double momentum = std::numeric_limits<double>::infinity();  ///< of the motion [N s]
@@ -64,13 +68,12 @@ class CoulombStep {
   LinearRest linear_rest(const Vector& d, const CoulombStart& start, double firm_enough, double& work) const;
 
  private:
-  /// A contact and the columns of H that belong to it: what impulses along x, y and z do to the blocks of
-  /// freedoms that it touches, and moments about them.
+  /// A contact and the columns of H that belong to it.
   struct Columns {
     Freedoms::Column blocks;  ///< which ones: values are those of x
-    std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>> H;
+    ContactColumns H;
     bool rolls = false;
-    std::array<Eigen::Matrix<double, 6, 3>, std::tuple_size_v<Freedoms::Column>> turns;  ///< 0 if it does not
+    ContactColumns turns;  ///< of moments; 0 where it does not roll
   };
   /// P' rho: of the impulse, of the moment by what moves the impulse, and by the rate of rolling.
   struct Slope {

@@ -44,6 +44,10 @@ Rolling rolling_at(const BodyProblem& problem, std::size_t k, const Vec3& rate, 
   return {rate, rolling_mobility(problem, k), problem.rolling[k].arm * r_n};
 }
 
+double wrong_moment(const BodyProblem& problem, std::size_t k, const Vec3& m, const Rolling& contact) {
+  return (m - solve_rolling(m, contact)).norm() / rolling_lever(problem, k);
+}
+
 bool has_rolling(const BodyProblem& problem) {
   for (std::size_t k = 0; k < problem.rolling.size(); ++k)
     if (rolls(problem, k)) return true;
@@ -151,7 +155,7 @@ double RollingSet::see(double firmness, std::span<const Twist> motion, std::span
     const Rolling contact =
         rolling_at(*problem_, k, rate_[k] + rolling_rate(*problem_, k, motion), carried[k]);
     const Vec3 aim = m - contact.rate / contact.mobility, right = admissible_moment(aim, contact.most);
-    wrong += (m - right).norm() / rolling_lever(*problem_, k);
+    wrong += wrong_moment(*problem_, k, m, contact);
     state_[k] = contact.most == 0 ? State::none : right == aim ? State::held : State::bound;
     if (held(k)) continue;
     known_[k] = right - before;

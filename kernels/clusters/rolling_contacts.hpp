@@ -25,6 +25,9 @@ Vec3 rolling_rate_at(const BodyProblem& problem, std::size_t k, std::span<const 
 /// Contact k under an impulse, where it rolls so fast.
 Rolling rolling_at(const BodyProblem& problem, std::size_t k, const Vec3& rate, const Vec3& impulse);
 
+/// How far a moment of contact k is from its law, over the smaller radius [N s].
+double wrong_moment(const BodyProblem& problem, std::size_t k, const Vec3& m, const Rolling& contact);
+
 /// Any contact does.
 bool has_rolling(const BodyProblem& problem);
 
