@@ -133,12 +133,12 @@ void CheckpointKeeper::start(const RunMemory& memory) {
   last_save_ = graph::seconds_now();
 }
 
-bool CheckpointKeeper::save(const Simulation& simulation, RunMemory memory) {
+bool CheckpointKeeper::save(const Simulation& simulation, RunMemory memory, bool counts) {
   const double began = graph::seconds_now();
   const std::int64_t step = simulation.report().step;
   memory.saves_passed = due_.passed();
-  memory.saved = saved_ + 1;
-  const bool archived = spec_.archive_every && memory.saved % *spec_.archive_every == 0;
+  memory.saved = saved_ + (counts ? 1 : 0);
+  const bool archived = counts && spec_.archive_every && memory.saved % *spec_.archive_every == 0;
   bool written = true;
   io::CheckpointFile file{simulation.checkpoint(), text_of(memory), std::move(texts_)};
   try {

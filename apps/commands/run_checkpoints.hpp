@@ -24,7 +24,7 @@ struct RunMemory {
   Tally tally;
   std::int64_t frames_passed = 0;   ///< DueClock of frames
   std::int64_t saves_passed = 0;    ///< the same of checkpoints
-  std::int64_t saved = 0;           ///< checkpoints so far, which archive_every counts
+  std::int64_t saved = 0;           ///< checkpoints so far that count for archive_every
   double wall_s = 0;                ///< elapsed [s]
   std::vector<double> wall_points;  ///< where the walls stood at first [m]
   double wall_mass = 0;             ///< of pushed walls to which the scene gives none [kg]
@@ -59,7 +59,9 @@ class CheckpointKeeper {
 
   /// Collective, behind Simulation::begin_next_stage(). `memory`: but for what the keeper counts itself.
   /// False, on all ranks, when it could not be written: earlier ones are there still, and rank 0 says why.
-  bool save(const Simulation& simulation, RunMemory memory);
+  /// `counts`: for archive_every. One that is written only since the run ends here does not: where a run is
+  /// stopped must not choose which states stay.
+  bool save(const Simulation& simulation, RunMemory memory, bool counts);
 
   std::optional<std::int64_t> last_step() const { return last_step_; }  ///< of the last checkpoint
   double last_save() const { return last_save_; }                       ///< clock then

@@ -64,7 +64,12 @@ void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
   summary.worst_penetration = worst_penetration;
   summary.overlapping_steps = overlapped;
   summary.worst_overlap = worst_overlap;
-  if (sufficient_time_step > 0) summary.sufficient_time_step = sufficient_time_step;
+  summary.sufficient_time_step = enough_time_step();
+}
+
+std::optional<double> Tally::enough_time_step() const {
+  if (sufficient_time_step == 0 || jammed > 0) return std::nullopt;
+  return sufficient_time_step;
 }
 
 std::string counted(std::size_t count, const char* what) {
@@ -117,33 +122,12 @@ std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls) {
 
 namespace {
 
-std::string remedy_of_overlaps(const Tally& tally, const std::vector<Wall>& walls) {
-  std::string text;
-  if (tally.sufficient_time_step > 0)
-    text = fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step);
-  const std::int64_t with = tally.deepest.overlapping->with;
-  if (with >= 0 || walls[static_cast<std::size_t>(-1 - with)].from_stage.empty()) return text;
-  return text + fmt::format("; but where grains stood as that wall appeared, in stage '{}', none will",
-                            walls[static_cast<std::size_t>(-1 - with)].from_stage);
-}
-
-/// What came and went, and what found no room.
+/// What came and went.
 void print_grains(const Terminal& terminal, const Simulation& simulation) {
   for (const InsertReport& insert : simulation.inserted()) {
     terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
                  counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
-    if (simulation.finished() && insert.placed == 0 && insert.no_room == 0)
-      terminal.warn(
-          "warning: insert '{}' placed no grain, as none was due: its `stage`, `from` and `until` leave it "
-          "no time in this run, or its rate is too low",
-          insert.name);
-    if (insert.no_room > 0 && insert.waiting > 0)
-      terminal.warn(
-          "warning: insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "
-          "inserted.csv says when. Enlarge its region, raise its velocity, or ask for fewer",
-          insert.name, counted(static_cast<std::size_t>(insert.no_room), "step"),
-          counted(static_cast<std::size_t>(insert.waiting), "grain"));
-    else if (insert.no_room > 0)
+    if (insert.no_room > 0 && insert.waiting == 0)
       terminal.say("insert '{}' had no room for a grain in {}; all that were due have come", insert.name,
                    counted(static_cast<std::size_t>(insert.no_room), "step"));
   }
@@ -151,11 +135,29 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
     terminal.say("remove '{}': {}{}, {:.6g} kg", remove.name,
                  counted(static_cast<std::size_t>(remove.count), "grain"),
                  remove.material.empty() ? "" : fmt::format(" of '{}'", remove.material), remove.mass);
-  if (!simulation.removed().empty() && simulation.bodies() == 0)
-    terminal.warn("warning: no grain is left at the end");
+}
+
+/// Overlaps are a matter of the time step alone.
+std::string remedy_of_misses(const io::Summary& summary) {
+  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
+  std::string remedy = "Raise solver.max_iterations, reduce time_step";
+  if (overlaps_alone) remedy = "Reduce time_step";
+  if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
+  return remedy;
 }
 
 }  // namespace
+
+std::string note_of_direct_solves(const Simulation& simulation, const Tally& tally, double seconds) {
+  const bool most = tally.small > seconds && tally.small > 0.5 * tally.lately;
+  if (simulation.setup().solver.direct_bodies == 0 || !most) return "";
+  return fmt::format(
+      "direct solves of small clusters, which show how far their velocities and forces are off, took {:.3g} "
+      "of "
+      "the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
+      "(docs/certificate.md)",
+      tally.small, tally.lately);
+}
 
 void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally) {
   print_grains(terminal, simulation);
@@ -166,66 +168,9 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         "waiting for them took {:.1f} % of the iterations on rank 0",
         messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
         tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
-  constexpr double worth_a_word = 1;  // s, and half of the iterations
-  if (simulation.setup().solver.direct_bodies > 0 && tally.small > worth_a_word &&
-      tally.small > 0.5 * tally.lately)
-    terminal.say(
-        "direct solves of small clusters, which show how far their velocities and forces are off, took "
-        "{:.3g} of the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
-        "(docs/certificate.md)",
-        tally.small, tally.lately);
-  if (tally.passed > 0)
-    terminal.warn(
-        "warning: a grain went through what it met, or deep into it, within one step, in {}; "
-        "these steps count as unconverged. Reduce time_step",
-        counted(static_cast<std::size_t>(tally.passed), "case"));
-  if (tally.overlapped > 0)
-    terminal.warn(
-        "warning: {} ended with overlaps beyond solver.overlap_tolerance = {:.2g}: the deepest, "
-        "{:.2g} of the smaller radius, of {} in step {}; overlap_body and overlap_with in steps.csv "
-        "name one of each step{}",
-        counted(static_cast<std::size_t>(tally.overlapped), "step"),
-        simulation.setup().solver.overlap_tolerance, tally.deepest.overlap,
-        name_of(*tally.deepest.overlapping, simulation.setup().walls), tally.deepest.step,
-        remedy_of_overlaps(tally, simulation.setup().walls));
-  const SolverSettings& solver = simulation.setup().solver;
-  if (tally.unanswered > 0)
-    terminal.warn(
-        "warning: in {} nothing is known of some small cluster of contacts: within {} sweeps its direct "
-        "solve "
-        "found no answer, and `balance` is 1 or more. Raise solver.max_iterations, or leave such clusters to "
-        "estimates, which may take a wrong step for right: solver.direct_bodies = 0 (docs/certificate.md)",
-        counted(static_cast<std::size_t>(tally.unanswered), "step"), solver.max_iterations);
-  // A step that another tolerance missed may have contacts that are all right: to name one would mislead.
-  if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > solver.tolerance)
-    terminal.warn(
-        "warning: of the steps that missed, step {} is the furthest off: at the contact of {} by {:.2g} of "
-        "its velocities, and {} by {:.2g}; worst_* in steps.csv name those of each",
-        tally.furthest.step, name_of(worst.contact, simulation.setup().walls), worst.contact_error,
-        name_of(worst.body, simulation.setup().walls), worst.body_error);
-  if (tally.stagnated > 0)
-    terminal.warn(
-        "warning: in {} the error stood still above the tolerance, at {:.2g} at worst; "
-        "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
-        "time_step, or try another solver.method",
-        counted(static_cast<std::size_t>(tally.stagnated), "step"), tally.floor);
-  if (tally.jammed > 0)
-    terminal.warn(
-        "warning: in {} walls close on grains that cannot get away, or a cell does, or rebounds between near "
-        "walls: no velocities keep all contacts from approaching, so these steps have no solution and ended "
-        "early. Push walls with a force and cells with a stress instead of a velocity, slow them down, or "
-        "remove what overlaps there; for such rebounds take restitution_law = \"moreau\" or a shorter "
-        "time_step",
-        counted(static_cast<std::size_t>(tally.jammed), "step"));
-}
-
-/// Overlaps are a matter of the time step alone.
-std::string remedy_of_misses(const io::Summary& summary) {
-  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
-  std::string remedy = "Raise solver.max_iterations, reduce time_step";
-  if (overlaps_alone) remedy = "Reduce time_step";
-  if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
-  return remedy;
+  constexpr double worth_a_word = 1;  // s
+  if (const std::string note = note_of_direct_solves(simulation, tally, worth_a_word); !note.empty())
+    terminal.say("{}", note);
 }
 
 void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ struct Tally {
   std::int64_t overlapped = 0;                 ///< steps that ended with an overlap beyond its tolerance
   StepReport deepest;                          ///< of these steps the one with the deepest
   StepReport furthest;  ///< of the steps whose iterations did not converge the one with the worst contact
-  double sufficient_time_step = 0;    ///< [s] at which they would have stayed within it; 0: not known
+  double sufficient_time_step = 0;    ///< [s] enough for all overlaps so far; 0: not known
   double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
   double lately = 0, small = 0;       ///< [s] since the run began or went on: in the iterations; of these for
                                       ///< answers of small clusters
@@ -42,6 +43,9 @@ struct Tally {
   /// An overlap is at most the time step times a speed (docs/theory.md, "Gap term and restitution"): the step
   /// that made one would have kept within the tolerance at a time step smaller by as much as it was missed.
   void add_overlap(const Simulation& simulation);
+  /// [s] at which overlaps would have stayed within their tolerance; none where that is not known, or where
+  /// walls close on grains: no time step is short enough for these.
+  std::optional<double> enough_time_step() const;
   /// Fills in steps, iterations and worst errors; `last` is the report of the last step.
   void sum_up(const StepReport& last, io::Summary& summary) const;
 };
@@ -64,9 +68,12 @@ std::string name_of(std::int64_t body, const std::vector<Wall>& walls);
 /// "bodies 3 and 17", "body 3 and wall 'floor'".
 std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls);
 
-/// Messages of an exchange, and warnings of steps that grains passed through one another in, that ended with
-/// overlaps, or whose error stood still.
+/// Grains that came and went, messages of an exchange, and the time of direct solves.
 void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally);
+
+/// What direct solves of small clusters cost, where that is more than `seconds` and half of the iterations;
+/// else "".
+std::string note_of_direct_solves(const Simulation& simulation, const Tally& tally, double seconds);
 
 /// What came of the run, of which the results are in `directory`.
 void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,

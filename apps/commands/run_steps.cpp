@@ -14,6 +14,7 @@
 #include "apps/commands/dump_fclib.hpp"
 #include "apps/commands/recorder_feed.hpp"
 #include "apps/commands/run_checkpoints.hpp"
+#include "apps/commands/run_findings.hpp"
 #include "apps/commands/run_limit.hpp"
 #include "apps/commands/run_messages.hpp"
 #include "apps/commands/run_status.hpp"
@@ -64,9 +65,20 @@ class Lines {
   void finish() {
     for (io::Progress& line : lines_) line.finish();
   }
+  /// Once, while it can be changed yet.
+  void tell_cost(const PreparedRun& run, const Simulation& simulation, const Tally& tally) {
+    constexpr double patience = 20;  // s
+    if (lines_.empty() || told_) return;
+    const std::string note = note_of_direct_solves(simulation, tally, patience);
+    if (note.empty()) return;
+    told_ = true;
+    finish();
+    run.terminal.say("{}", note);
+  }
 
  private:
   std::vector<io::Progress> lines_;
+  bool told_ = false;
 };
 
 /// The parts of a run that its steps feed.
@@ -94,13 +106,13 @@ struct Advance {
     feed.drain();
     return recorder.mark();
   }
-  bool save(io::OutputMark mark) {
+  bool save(bool counts) {
     simulation.release_room();
     RunMemory now = memory;
-    now.mark = std::move(mark);
+    now.mark = mark();
     now.frames_passed = frames.passed();
     now.wall_s += graph::seconds_now() - run.began;
-    const bool saved = keeper.save(simulation, std::move(now));
+    const bool saved = keeper.save(simulation, std::move(now), counts);
     limit.took_save(keeper.seconds());
     return saved;
   }
@@ -134,6 +146,7 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
       all.frames.due(report.step, report.time) || (stage_ends && run.scene.output.stage_frames);
   if (written) all.write_frame();
   lines.update(simulation);
+  lines.tell_cost(run, simulation, all.memory.tally);
   if (stage_ends) {
     lines.finish();
     if (first) print_stage_end(run.terminal, simulation);
@@ -141,7 +154,8 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   simulation.begin_next_stage();
   stop.asked = simulation.finished() ? Asked{} : asked;
   const bool ends = simulation.finished() || last || stop.asked.ends();
-  if (due || asked.save || stop.asked.ends() || (ends && options.resume)) stop.saved = all.save(all.mark());
+  const bool counts = due || asked.save;
+  if (counts || stop.asked.ends() || (ends && options.resume)) stop.saved = all.save(counts);
   // Where a run stops for good; one that goes on cuts this frame off again, and its time may be up.
   const bool in_haste = stop.asked.ends() && run.granted;
   if (ends && !written && !in_haste && run.scene.output.stage_frames) all.write_frame();
@@ -302,7 +316,11 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
   // The other ranks may wait for what will not come: the caller ends them when the files are whole.
   if (summary.status == "failed") return;
   if (trace) trace->finish(executor);
-  if (ranks.rank() == 0) print_notes(terminal, simulation, tally);
+  summary.findings = run_findings(simulation, tally);
+  if (ranks.rank() == 0) {
+    print_notes(terminal, simulation, tally);
+    for (const std::string& finding : summary.findings) terminal.warn("warning: {}", finding);
+  }
   if (summary.status == "done") {
     if (tally.unconverged > 0 && !scene.setup.allow_unconverged) summary.exit_code = exit_tolerance_missed;
     const bool last_stage = simulation.stage_index() + 1 == scene.setup.stages.size();

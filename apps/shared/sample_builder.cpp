@@ -14,6 +14,7 @@
 #include "apps/shared/signals.hpp"
 #include "apps/shared/state_sample.hpp"
 #include "io/scene/bodies_file.hpp"
+#include "kernels/bodies/farthest.hpp"
 #include "kernels/detection/images.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/samples/sample.hpp"
@@ -169,9 +170,10 @@ void check(const io::Scene& scene, const Sample& sample) {
           "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg, which must lie in {} to {}; "
           "give lengths in m and densities in kg/m^3",
           sample.radius[k], sample.density_of(k), m, least_mass, most_mass));
-    if (!sample.velocity.empty() &&
-        !std::ranges::all_of(sample.velocity[k], [](double v) { return std::isfinite(v); }))
-      refuse("radius times angular velocity is not finite");
+    const auto near = [](double number) { return std::abs(number) <= farthest; };
+    if (!near(sample.x[k].cwiseAbs().maxCoeff())) refuse("its centre is beyond 1e15 m");
+    if (!sample.velocity.empty() && !std::ranges::all_of(sample.velocity[k], near))
+      refuse("its velocity, or radius times angular velocity, is beyond 1e15 m/s");
     if (!sample.velocity.empty() && sample.shape.number != 0 &&
         std::any_of(sample.velocity[k].begin() + 3, sample.velocity[k].end(),
                     [](double w) { return w != 0; }))

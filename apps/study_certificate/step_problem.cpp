@@ -42,7 +42,7 @@ constexpr double roundings_of_gap = 4;
 bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double reach, double& bias) {
   if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
   bias = std::max(0.0, pair.gap) / numbers.h;
-  if (restitution > 0 && std::abs(pair.v_n) > numbers.slow) {
+  if (restitution > 0 && (numbers.slow == 0 || std::abs(pair.v_n) > numbers.slow)) {
     const bool closes = pair.v_n < 0 && pair.gap + numbers.h * pair.v_free < 0;
     if (pair.gap <= 0 || pair.closed || (closes && pair.gap < numbers.turning))
       bias = restitution * pair.v_n;

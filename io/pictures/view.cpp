@@ -66,7 +66,7 @@ Projection fitted(const Bounds& box, const Axes& axes, std::size_t width) {
   const double across = high[0] - low[0], along = high[1] - low[1];
   Projection view{axes};
   view.width = static_cast<double>(width * samples);
-  view.height = std::ceil(view.width / samples * std::min(tallest, along / across)) * samples;
+  view.height = std::max(1.0, std::ceil(view.width / samples * std::min(tallest, along / across))) * samples;
   view.scale = (1 - 2 * margin) * std::min(view.width / across, view.height / along);
   view.x = (low[0] + high[0]) / 2, view.y = (low[1] + high[1]) / 2;
   return view;
@@ -350,7 +350,9 @@ std::vector<Bend> bends_of(std::span<const Triangle> triangles) {
 Image render_view(const Frame& frame, std::span<const Wall> walls,
                   std::span<const std::vector<Triangle>> triangles, const ViewOptions& options) {
   const Bounds box = options.box.value_or(view_bounds(frame, triangles));
-  if (!(box.high.array() >= box.low.array()).all() || (box.high - box.low).norm() == 0) {
+  constexpr double largest = 1e100;  // [m] whose squares and ratios are numbers
+  const double size = (box.high - box.low).cwiseAbs().maxCoeff();
+  if (!(box.high.array() >= box.low.array()).all() || size == 0 || size > largest) {
     const std::size_t height = options.width / 2;
     return {options.width, height, std::vector<std::uint8_t>(3 * options.width * height, 255)};
   }

@@ -1,10 +1,14 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <stdexcept>
+#include <system_error>
+#include <thread>
 
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/rehearsal.hpp"
 #include "io/files/error.hpp"
+#include "io/results/detail/directory_undo.hpp"
 #include "io/results/results.hpp"
 #include "runtime/step/cell_flow.hpp"
 
@@ -111,21 +115,43 @@ constexpr const char* instead_of_results =
     "give a checkpoint of the run in its place, or run the scene anew (where a run is writing a frame it may "
     "look so for a moment: try again)";
 
+/// A frame is written within milliseconds, and a reader that looks in between meets half of a directory.
+struct Looks {
+  int most = 20;                          ///< before the file is called damaged
+  std::chrono::milliseconds between{50};  ///< one look and the next
+};
+
+/// What `read` returns of a file that a run may write to meanwhile. Throws FileError.
+template <class Read>
+auto read_while_written(const std::string& path, const Read& read) {
+  const detail::QuietHdf5 quiet;
+  std::error_code unknown;
+  for (int look = 1;; ++look) {
+    const auto before = std::filesystem::last_write_time(path, unknown);
+    try {
+      return detail::rehearsed(path, instead_of_results, read);
+    } catch (const FileError&) {
+      const bool written =
+          detail::directory_is_kept(path) || std::filesystem::last_write_time(path, unknown) != before;
+      if (look == Looks{}.most || !written) throw;
+    }
+    std::this_thread::sleep_for(Looks{}.between);
+  }
+}
+
 }  // namespace
 
 std::size_t frame_count(const std::filesystem::path& path) {
-  const detail::QuietHdf5 quiet;
   const std::string name = path.string();
-  return detail::rehearsed(name, instead_of_results, [&name] {
+  return read_while_written(name, [&name] {
     const Hdf5Object file = open_results(name);
     return count_frames(file.id(), name);
   });
 }
 
 bool holds_clumps(const std::filesystem::path& path) {
-  const detail::QuietHdf5 quiet;
   const std::string name = path.string();
-  return detail::rehearsed(name, instead_of_results, [&name] {
+  return read_while_written(name, [&name] {
     const Hdf5Object file = open_results(name);
     return H5Aexists(file.id(), "clumps") > 0;
   });
@@ -195,9 +221,8 @@ Frame load_frame(const std::string& name, std::size_t index, FrameParts parts) {
 }  // namespace
 
 Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts) {
-  const detail::QuietHdf5 quiet;
   const std::string name = path.string();
-  return detail::rehearsed(name, instead_of_results, [&] { return load_frame(name, index, parts); });
+  return read_while_written(name, [&] { return load_frame(name, index, parts); });
 }
 
 }  // namespace talus::io

@@ -138,6 +138,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"bodies_at_end", bodies_at_end},
       {"frames", s.frames},
       {"warnings", s.warnings},
+      {"findings", s.findings},
   };
   // Names of files and hosts may be anything: bytes that are not UTF-8 are replaced, not a reason to lose the
   // run.

@@ -78,6 +78,7 @@ struct Summary {
   std::size_t bodies = 0;                      ///< with which it began
   std::optional<std::size_t> bodies_at_end;    ///< with those that came, without those that went; once known
   std::vector<std::string> warnings = {};      ///< of the scene, said when the run began
+  std::vector<std::string> findings = {};      ///< of its steps, said at its end
   std::size_t frames = 0;                      ///< output times
 };
 

@@ -88,7 +88,7 @@ class SceneReader {
     try {
       check();
     } catch (const std::invalid_argument& error) {
-      fail_at(*root_.get("cell"), "cell", error.what());
+      fail_at(*root_.get(root_.contains("cell") ? "cell" : "stage"), "", error.what());
     }
   }
 

@@ -16,6 +16,11 @@ namespace {
 
 using Vector = Eigen::VectorXd;
 
+/// Grains and walls of a cluster.
+std::ptrdiff_t bodies_of(const BodyProblem& problem) {
+  return std::ssize(problem.bodies) - (problem.has_cell() ? 1 : 0);
+}
+
 /// Loops that pairs of bodies close which have contacts, in a cluster.
 std::ptrdiff_t loops_of(const BodyProblem& problem) {
   std::vector<std::array<std::int32_t, 2>> pairs;
@@ -23,8 +28,7 @@ std::ptrdiff_t loops_of(const BodyProblem& problem) {
     if (c.second >= 0) pairs.push_back({std::min(c.first, c.second), std::max(c.first, c.second)});
   std::sort(pairs.begin(), pairs.end());
   const auto pairs_end = std::unique(pairs.begin(), pairs.end());
-  const std::size_t bodies = problem.bodies.size() - (problem.has_cell() ? 1 : 0);
-  return pairs_end - pairs.begin() - static_cast<std::ptrdiff_t>(bodies) + 1;
+  return pairs_end - pairs.begin() - bodies_of(problem) + 1;
 }
 
 /// Steps of Coulomb's law (search_by_steps), whose impulses are the next t.
@@ -81,7 +85,9 @@ class CoulombSteps {
 
   std::optional<double> to_come(const Correction& now, const ClusterGoal& goal, double& work) const {
     const CoulombThresholds::Known& known = thresholds_.known;
-    if (loops_ <= known.loops) return {};
+    const double least =
+        std::max(static_cast<double>(known.loops), known.looped * static_cast<double>(bodies_of(problem_)));
+    if (static_cast<double>(loops_) <= least) return {};
     const double left = known.left * goal.enough, most = known.to_come * goal.enough;
     if (now.open > left || now.left > left || known.steps * now.moved > most) return {};
     const LinearRest linear = step_.linear_rest(d_, began_, known.firmness, work);

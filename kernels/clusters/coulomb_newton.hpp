@@ -14,7 +14,7 @@ namespace talus {
 struct CoulombThresholds {
   /// A step is followed by a firmer one where it leaves more than `slow`, in (0, 1), of what the law found
   /// wrong before.
-  SearchThresholds search{.first_firmness = 1e3, .most_steps = 400};
+  SearchThresholds search{.first_firmness = 40, .most_steps = 400};
   double slow = 0.3;
   /// Momentum may be off by SearchThresholds::inner of what the law found wrong before a step, if that is
   /// more than the goal; and by this part of it, in (0, 1), where nothing makes it less.
@@ -24,8 +24,9 @@ struct CoulombThresholds {
   int most_iterations = 25, halvings = 5;
   double descent = 0.1;
   /// When velocities are known though impulses still creep, as redundant contacts let them do by the hundred
-  /// steps: bodies that touch close more than so many `loops`, >= 0, as chains do not; the law finds no
-  /// more wrong, nor is momentum off by more, than this part `left`, in (0, 1), of what need not be known;
+  /// steps: bodies that touch close more than so many `loops`, >= 0, and than this part `looped`, >= 0, of
+  /// their number, as chains do not; the law finds no more wrong, nor is momentum off by more, than this
+  /// part `left`, in (0, 1), of what need not be known;
   /// and what is still to come is within the part `to_come` of it, in (0, 1). That is so many `steps` like
   /// the last, > 1, as contacts may change; or if that is more all that would follow if they did not, as a
   /// firmness >> 1 shows. (In a heap of 190 grains at rest 300 further steps changed at most 1.4 times as
@@ -34,8 +35,8 @@ struct CoulombThresholds {
   /// fifth of balance_tolerance: CertificateThresholds::velocity_resolution). What is asked for less finely
   /// is of velocities: beds at rest would be left without an answer.
   struct Known {
-    std::int32_t loops = SmallClusters{}.loops;
-    double left = 0.02, to_come = 0.5;
+    std::int32_t loops = 20;
+    double looped = 0.2, left = 0.02, to_come = 0.5;
     double steps = 20, firmness = 1e9, forces = 2, fine = 1.1e-3;
   };
   Known known = {};

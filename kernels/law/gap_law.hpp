@@ -14,7 +14,7 @@ struct GapRule {
   double time_step;    ///< h [s]
   double alert;        ///< [m]
   double restitution;  ///< e in [0, 1], where pairs have none of their own
-  double slow;         ///< [m/s] no restitution up to here
+  double slow;         ///< [m/s] no restitution up to here, 2 h |gravity|; without gravity nothing is at rest
   double turning = std::numeric_limits<double>::infinity();  ///< [m] an impact turns no earlier than this
   double reflection = 0;  ///< E of Moreau's law (restitution_law.hpp); 0: the bias is that of v_n
   double reach = 0;       ///< of cohesion over the smaller radius, where pairs have none of their own
@@ -60,10 +60,12 @@ template <class V, class E>
     absent |= quick & (meets == BitsOf<V>{}) &
               (closes | ((V{} + restitution >= 1) & ((gap <= reach) == BitsOf<V>{})));
   };
+  // Without gravity a pair that rests is no other than one that moves by rounding: with e = 1 both fly on.
+  const double slow = rule.slow > 0 ? rule.slow : -1;
   if constexpr (std::same_as<E, double>) {
-    if (restitution > 0) impact(absolute(v_n) > rule.slow);
+    if (restitution > 0) impact(absolute(v_n) > slow);
   } else {
-    impact((restitution > 0) & (absolute(v_n) > rule.slow));
+    impact((restitution > 0) & (absolute(v_n) > slow));
   }
   if (rule.reflection > 0) bias = positive_part(bias - rule.reflection * v_n) / (1 + rule.reflection);
   return {bias, absent};

@@ -15,7 +15,7 @@ std::span<const LawNumberEntry> law_numbers() {
       all.push_back({*one, one->name, one->unit, infinity, one->sentence});
     all.push_back({&PairLaw::rolling_resistance, "rolling_resistance", "", infinity,
                    "Moment that resists rolling, over the normal force times the reduced radius; needs "
-                   "friction."});
+                   "friction; clumps have none."});
     return all;
   }();
   return entries;

@@ -1,3 +1,8 @@
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "kernels/bodies/farthest.hpp"
 #include "kernels/shapes/shape.hpp"
 
 namespace talus {
@@ -24,6 +29,13 @@ const ShapeEntry* wall_shape(const std::string& name) {
 void make_surface(WallShape& shape) {
   const ShapeEntry* entry = wall_shape(shape.name);
   if (entry == nullptr) return;
+  const auto near = [](double length) { return std::abs(length) <= farthest; };
+  for (const auto& [name, numbers] : shape.values.number)
+    if (!std::ranges::all_of(numbers, near)) throw std::invalid_argument(name + " is beyond 1e15 m");
+  for (const Triangle& triangle : shape.values.triangles)
+    for (const Vec3& corner : triangle)
+      if (!near(corner.cwiseAbs().maxCoeff()))
+        throw std::invalid_argument("a corner of the mesh is beyond 1e15 m");
   shape.surface = entry->make(shape.values);
   shape.values.triangles = {};
 }

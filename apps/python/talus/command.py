@@ -101,8 +101,8 @@ def run(
     """
     from .scene import Scene
 
-    if ranks < 1:
-        raise ValueError(f"ranks must be 1 or more, got {ranks}")
+    if int(ranks) != ranks or ranks < 1:
+        raise ValueError(f"ranks must be a whole number, 1 or more, got {ranks}")
     if isinstance(options, str):
         raise TypeError(f"options are a list of words, [{', '.join(repr(word) for word in options.split())}], not one text")
     talus = find_program(program)
@@ -122,7 +122,7 @@ def run(
         written.put(replace=force or resume)
     words = [talus, "run", str(path), "--out", str(directory)]
     if ranks > 1:
-        words = ["mpirun", "-n", str(ranks), *words]
+        words = ["mpirun", "-n", str(int(ranks)), *words]
     if threads is not None:
         words += ["--threads", str(threads)]
     words += ["--force"] * force + ["--resume"] * resume + list(options)

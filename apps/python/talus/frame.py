@@ -215,8 +215,11 @@ class Frame:
         ids = np.asarray(ids)
         rows = np.minimum(np.searchsorted(self.ids, ids), max(len(self.ids) - 1, 0))
         if ids.size and (len(self.ids) == 0 or not np.array_equal(self.ids[rows], ids)):
-            raise MissingData(f"{self._path}: frame {self.index} lacks a grain of the ids asked for; walls have negative "
-                              "ids: choose contacts by `between_grains` first")
+            lacking = np.setdiff1d(ids, self.ids)
+            why = ("walls have negative ids: choose contacts by `between_grains` first" if lacking[0] < 0 else
+                   "they came later, or were removed before; choose frames, or ids, that have both")
+            raise MissingData(f"{self._path}: frame {self.index} lacks {len(lacking)} of the ids asked for, as "
+                              f"{lacking[0]}; {why}")
         return rows
 
 

@@ -172,6 +172,11 @@ void keep_directory(const std::string& path) {
   }
 }
 
+bool directory_is_kept(const std::string& path) {
+  std::error_code unknown;
+  return std::filesystem::exists(undo_name(path), unknown);
+}
+
 void drop_directory(const std::string& path) {
   std::error_code ignored;
   std::filesystem::remove(undo_name(path), ignored);

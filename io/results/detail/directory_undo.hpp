@@ -16,6 +16,8 @@ namespace talus::io::detail {
 /// Writes `path`.undo: the bytes of superblock and directory, and the length of the file. What cannot be kept
 /// is not guarded, and nothing more.
 void keep_directory(const std::string& path);
+/// Whether there is a `path`.undo: a frame is being written, or its writer was killed.
+bool directory_is_kept(const std::string& path);
 /// The change is complete: `path`.undo goes.
 void drop_directory(const std::string& path);
 /// Where there is a `path`.undo, the file becomes what it was then. Throws FileError.

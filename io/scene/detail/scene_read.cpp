@@ -132,6 +132,11 @@ void check_name(const toml::table& table, const std::string& path, const std::st
   if (name.empty() || !std::all_of(name.begin(), name.end(), may_be_in_name))
     fail_at(*table.get("name"), joined(path, "name"),
             fmt::format("must be made of letters, digits, +, - and _, got '{}'", name));
+  // Names of files and columns are made of it, and file systems end at 255 bytes.
+  constexpr std::size_t longest = 100;
+  if (name.size() > longest)
+    fail_at(*table.get("name"), joined(path, "name"),
+            fmt::format("has {} characters; at most {} are taken", name.size(), longest));
 }
 
 }  // namespace talus::io::detail

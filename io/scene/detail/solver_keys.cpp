@@ -27,8 +27,9 @@ Section<DetectionSettings> detection_keys() {
 Section<SolverSettings> solver_keys() {
   return {
       "[solver]",
-      "When a step counts as solved, and how hard to try. Clumps and rolling resistance go with "
-      "neither `nlgs+momentum` nor `nncg`, a cell that follows a stress with no `overlap_correction`.",
+      "When a step counts as solved, and how hard to try. Neither clumps nor rolling resistance "
+      "go with `nlgs+momentum` or `nncg`, nor with one another; a cell that follows a stress goes with no "
+      "`overlap_correction`.",
       {
           choice<SolverSettings>("method", methods(), &SolverSettings::method),
           key<SolverSettings>("tolerance", "", positive,
