@@ -78,9 +78,8 @@ class SceneReader {
   /// A table that may be left out: then an empty one, so that missing keys are found all the same.
   const toml::table& table_at(const toml::table& parent, const std::string& name) {
     const toml::node* node = parent.get(name);
-    if (!node) return nothing_;
-    if (!node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
-    return *node->as_table();
+    if (node && !node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
+    return node ? *node->as_table() : nothing_;
   }
   /// What the cell has no room for is told at its line.
   template <class Check>
@@ -88,12 +87,13 @@ class SceneReader {
     try {
       check();
     } catch (const std::invalid_argument& error) {
-      fail_at(*root_.get(root_.contains("cell") ? "cell" : "stage"), "", error.what());
+      const std::string table = root_.contains("cell") ? "cell" : "stage", what = error.what();
+      fail_at(*root_.get(table), table, what.starts_with("cell: ") ? what.substr(6) : what);
     }
   }
 
   void read_cell() {
-    if (!root_.get("cell")) return;
+    if (!root_.contains("cell")) return;
     CellSpec& cell = scene_.cell;
     read_table(table_at(root_, "cell"), "cell", keys_.cell, {}, cell);
     scene_.setup.cell_inertia = cell.inertia;

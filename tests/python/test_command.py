@@ -133,6 +133,8 @@ def test_a_scene_that_the_program_refuses_blocks_no_better_one(heap, tmp_path):
 def test_arguments_of_another_kind_are_named(heap, tmp_path):
     with pytest.raises(ValueError, match="ranks must be a whole number, 1 or more, got 0"):
         talus.run(heap, tmp_path / "run", ranks=0)
+    with pytest.raises(ValueError, match="whole number, 1 or more, got 2.5"):
+        talus.run(heap, tmp_path / "run", ranks=2.5)
     with pytest.raises(TypeError, match="'--steps', '2'"):
         talus.run(heap, tmp_path / "run", options="--steps 2")
     with pytest.raises(TypeError, match="friction: give a list of values"):

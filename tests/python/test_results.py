@@ -154,6 +154,8 @@ def test_what_is_missing_is_said(heap_run):
         heap_run.frame(0).orientations
     with pytest.raises(talus.MissingData, match="walls have negative ids"):
         heap_run.frame(-1).rows(np.array([-1]))
+    with pytest.raises(talus.MissingData, match="lacks 2 of the ids asked for, as 98765; they came later, or were removed"):
+        heap_run.frame(-1).rows(np.array([0, 98765, 98766]))
 
 
 @pytest.mark.parametrize("content", [b'{"summary": {"status": "do', b"", b"[1, 2]", b"\xff\xfe{}", b'{"summary": 3}'])

@@ -50,6 +50,29 @@ TEST(ObliqueImpact, StopsWhatSticksWithNewtonsLaw) {
   expect_oblique_impacts(RestitutionLaw::newton);
 }
 
+/// Three equal spheres in line, the first of which moves; gaps that it crosses within a tenth of a step.
+std::vector<double> speeds_of_struck_row(double second_speed) {
+  Scene scene(1e-4);
+  scene.friction(0);
+  scene.stage().laws.set_all(&PairLaw::restitution, 1);
+  for (const int k : {0, 1, 2})
+    scene.sphere({0.20001 * k, 0, 0}, 0.1, 1.0, {k == 0 ? 1.0 : k == 1 ? second_speed : 0.0, 0, 0});
+  Experiment run(std::move(scene));
+  run.steps(20);
+  return {run.u(0)[0], run.u(1)[0], run.u(2)[0]};
+}
+
+// An elastic impact that goes on to a sphere which rests has to leave it in the next step as it would one
+// that moves by rounding.
+TEST(ElasticImpact, PassesThroughSpheresAtRestWithoutLoss) {
+  for (const double second : {0.0, 1e-12}) {
+    const std::vector<double> u = speeds_of_struck_row(second);
+    EXPECT_NEAR(u[0], 0, 1e-11) << second;
+    EXPECT_NEAR(u[1], 0, 1e-11) << second;
+    EXPECT_NEAR(u[2], 1, 1e-11) << second;
+  }
+}
+
 struct Bounces {
   std::vector<double> speed_ratios;  ///< after over before, per impact on the floor
   std::vector<double> heights;       ///< of the centre above rest at its highest, per flight

@@ -143,6 +143,36 @@ velocity = [0, 0, -0.01]
   EXPECT_LT(summary(at("results")).at("iterations").get<int>(), 400) << "they end early";
 }
 
+// The grain begins in the lid. A shorter time step mends nothing where walls close on it, so none is
+// promised; and what the terminal said stands in the files as well.
+TEST_F(Warnings, OfTheEndStandInTheFilesAndPromiseNothingWhereStepsHaveNoSolution) {
+  std::string scene = with_bodies(column_scene);
+  scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
+  scene += R"(
+[[wall]]
+name = "lid"
+side = "z+"
+position = 0.02
+drive = "velocity"
+velocity = [0, 0, -0.5]
+)";
+  write(at("scene.toml"), scene);
+  write(at("grains.csv"), "id,x,y,z,radius\n42,0,0,0.01,0.01\n");
+  const Outcome outcome = run("run scene.toml --out results");
+  EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("overlaps beyond"), std::string::npos) << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("would do"), std::string::npos) << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("moreau"), std::string::npos) << "it is the law already";
+  const auto results = summary(at("results"));
+  EXPECT_TRUE(results.at("sufficient_time_step").is_null());
+  ASSERT_EQ(results.at("findings").size(), 3U) << results.at("findings");
+  const std::string page = content(at("results/report.html"));
+  for (const std::string finding : results.at("findings")) {
+    EXPECT_NE(outcome.messages.find("warning: " + finding), std::string::npos) << finding;
+    EXPECT_NE(page.find(finding), std::string::npos) << finding;
+  }
+}
+
 /// A grain that begins on the floor at 3 m/s, 0.3 radii in a step, half of which it is in before it rebounds.
 std::string bouncing() {
   std::string scene = with_bodies(column_scene);

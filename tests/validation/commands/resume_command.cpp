@@ -12,6 +12,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
@@ -272,6 +273,22 @@ TEST_F(Resume, KeepsArchivedCheckpoints) {
   for (const std::string name : {"archive_000005.h5", "archive_000010.h5", "checkpoint_000012.h5"})
     EXPECT_TRUE(fs::exists(at("kept") / name)) << name;
   EXPECT_EQ(checkpoints("kept"), 5U);
+}
+
+// Which states stay must not depend on where a queue stopped the run.
+TEST_F(Resume, ArchivesWhatItWouldHaveArchivedWithoutAStop) {
+  const std::string line =
+      "run scene.toml --out kept --resume --threads 1 --set checkpoint.every_steps=2 --set "
+      "checkpoint.archive_every=2";
+  for (const std::string steps : {" --steps 3", " --steps 7", ""})
+    ASSERT_EQ(run(line + steps).code, 0) << steps;
+  std::vector<std::string> archives;
+  for (const auto& entry : fs::directory_iterator(at("kept")))
+    if (const std::string name = entry.path().filename(); name.starts_with("archive_"))
+      archives.push_back(name);
+  std::sort(archives.begin(), archives.end());
+  EXPECT_EQ(archives,
+            (std::vector<std::string>{"archive_000004.h5", "archive_000008.h5", "archive_000012.h5"}));
 }
 
 TEST_F(Resume, IsToldOfByStatusAndLog) {

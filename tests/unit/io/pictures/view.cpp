@@ -85,6 +85,17 @@ TEST(View, OfNothingIsAWhiteImage) {
   EXPECT_EQ(pixel(image, 0, 0), (std::array<int, 3>{255, 255, 255}));
 }
 
+TEST(View, OfWhatNoPictureHoldsIsAWhiteImage) {
+  for (const double far : {1e120, 1e300}) {
+    const Image image = render_view(grains({{0, 0, 0}, {far, 0, 0}}), {}, {}, {});
+    ASSERT_GT(image.width * image.height, 0U);
+    EXPECT_EQ(image.rgb, std::vector<std::uint8_t>(3 * image.width * image.height, 255)) << far;
+  }
+  const Image flat = render_view(grains({{0, 0, 0}, {1e14, 0, 0}}), {}, {}, from_front());
+  EXPECT_EQ(flat.rgb.size(), 3 * flat.width * flat.height);
+  EXPECT_GT(flat.height, 0U);
+}
+
 TEST(View, ColoursAreBySpeedRadiusForceOrMaterial) {
   Frame frame = grains({{0, 0, 0}, {1, 0, 0}});
   frame.u[1] = {0, 3, 4};

@@ -4,10 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <thread>
 
+#include "io/files/error.hpp"
 #include "io/results/results.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
@@ -87,6 +90,27 @@ TEST(DirectoryUndo, IsTakenBackByAWriterThatGoesOn) {
   ASSERT_EQ(io::frame_count(path), 5U);
   EXPECT_EQ(io::read_frame(path, 3).step, 3);
   EXPECT_EQ(io::read_frame(path, 4).step, 17);
+}
+
+// As a reader meets the file while a run writes a frame: it looks again, and finds what is whole by then.
+TEST(DirectoryUndo, TellsReadersToLookAgain) {
+  const test::ScratchDirectory folder;
+  const fs::path path = folder / "results.h5", undo = folder / "results.h5.undo";
+  io::ResultsWriter writer(path, {"floor"});
+  writer.append(frame_of(0));
+  const std::string whole = bytes_of(path);
+  std::ofstream(undo, std::ios::binary) << "kept";
+  fs::resize_file(path, whole.size() / 2);
+  std::thread finishes([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(120));
+    std::ofstream(path, std::ios::binary) << whole;
+    fs::remove(undo);
+  });
+  EXPECT_EQ(io::frame_count(path), 1U);
+  finishes.join();
+  EXPECT_EQ(io::read_frame(path, 0).step, 0);
+  fs::resize_file(path, whole.size() / 2);
+  EXPECT_THROW(io::frame_count(path), io::FileError) << "nobody writes to it";
 }
 
 TEST(DirectoryUndo, LeavesOtherFilesAlone) {

@@ -55,6 +55,24 @@ TEST(CellScene, ReadsEdgesOriginAndShears) {
   EXPECT_FALSE(parsed(scene_test::scene_with()).setup.domain.repeats);
 }
 
+TEST(CellScene, RefusesCellsThatLeanFarOrLieFarAway) {
+  refuse(replaced(cube, "lengths", "shears = [0, 0.21, 0]\nlengths"), "test.toml:4", "twice the longer");
+  refuse(replaced(cube, "lengths", "origin = [0, 1e9, 0]\nlengths"), "test.toml:4", "too few digits");
+  refuse(replaced(cube, "count", "velocity = [0, 1e25, 0]\ncount"), "body 0", "beyond 1e15 m/s");
+  parsed(replaced(cube, "lengths", "shears = [0, -0.19, 0]\norigin = [0, 1e7, 0]\nlengths"));
+}
+
+// Whoever takes [cell] out of a scene leaves its flow behind.
+TEST(CellScene, RefusesFlowAndStressWithoutACell) {
+  std::string boxed = replaced(cube, "[cell]\nlengths = [0.1, 0.1, 0.1]\n", "");
+  boxed = replaced(boxed, "time_step", "box = true\ntime_step");
+  boxed = replaced(boxed, "kind = \"random\"\ncount = 100", "kind = \"lattice\"\ncells = [3, 3, 3]");
+  parsed(boxed);
+  for (const std::string flow :
+       {"strain_rates = [-1, 0, 0]", "shear_rates = [1, 0, 0]", "stress = { xx = 1e3 }"})
+    refuse(replaced(boxed, "[[stage]]", "[[stage]]\n" + flow), "test.toml:9: stage", "stage 'stage-1'");
+}
+
 TEST(CellScene, ReadsTheStressThatAStageFollowsAndWritesItAgain) {
   const Scene scene = parsed(replaced(
       replaced(cube, "lengths", "inertia = 4\nlengths"),

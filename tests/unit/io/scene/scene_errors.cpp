@@ -43,6 +43,11 @@ TEST(SceneErrors, WrongTypeSaysWhatWasExpectedAndFound) {
   expect_refused(replaced(scene_with(), "[[stage]]", "[stage]"), "[stage]", "stage", "write [[stage]]");
 }
 
+TEST(SceneErrors, NamesLongerThanFilesTakeAreRefused) {
+  expect_line_refused("#sample", "name = \"" + std::string(101, 'x') + '"', "sample.name",
+                      "has 101 characters");
+}
+
 TEST(SceneErrors, NumbersOutOfRangeAreNamedWithTheirLimit) {
   expect_line_refused("#material", "friction = -0.1", "material.friction", "must be >= 0, got -0.1");
   expect_line_refused("#material", "restitution = 1.5", "material.restitution", "must be 0 to 1, got 1.5");

@@ -136,6 +136,18 @@ TEST(GapLaw, LeavesOutPairsThatStayApartAndFollowsTheImpactLawOfFastOnes) {
   EXPECT_FALSE(stays_apart(0.2, -30.0, 0.01, 0.1)) << "closes within the step";
 }
 
+// Otherwise a lattice that nothing has moved yet would lose energy as it is struck, and one that moves by
+// rounding would not.
+TEST(GapLaw, HasNoRestWithoutGravity) {
+  GapRule rule{.time_step = 0.01, .alert = 0.1, .restitution = 1, .slow = 0};
+  EXPECT_TRUE(solve_gap(rule, 0.05, 0.0, 0.0, 1.0).absent);
+  EXPECT_EQ(solve_gap(rule, 0.05, 0.0, 0.0, 1.0).absent, solve_gap(rule, 0.05, 1e-12, 1e-12, 1.0).absent);
+  EXPECT_FALSE(solve_gap(rule, 0.0, 0.0, 0.0, 1.0).absent) << "what touches is a contact";
+  EXPECT_FALSE(solve_gap(rule, 0.05, 0.0, 0.0, 0.5).absent) << "with e < 1 others may push it together";
+  rule.slow = 1;
+  EXPECT_FALSE(solve_gap(rule, 0.05, 0.0, 0.0, 1.0).absent);
+}
+
 // v = (1 + E) vbar - E v-, where the contact carries and vbar = -b, is what each pair is to rebound with; and
 // b >= 0, by which no contact creates energy.
 TEST(GapLaw, GivesEachPairItsOwnReboundWithMoreausLaw) {

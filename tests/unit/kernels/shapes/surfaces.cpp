@@ -85,6 +85,10 @@ TEST(WallShapes, RefuseWhatMakesNoSurface) {
                std::invalid_argument);
   EXPECT_THROW(make("cylinder", {{"start", {1, 0, 0}}, {"end", {1, 0, 0}}, {"radius", {1}}}),
                std::invalid_argument);
+  const Numbers endless = {{"corner", {0, 0, 0}}, {"edge_a", {1e200, 0, 0}}, {"edge_b", {0, 1, 0}}};
+  WallShape plate{
+      .name = "rectangle", .values = {.number = endless, .file = {}, .triangles = {}}, .surface = {}};
+  EXPECT_THROW(make_surface(plate), std::invalid_argument);
   EXPECT_EQ(wall_shape("plane"), nullptr);
 }
 
