@@ -100,7 +100,7 @@ CaseResult frictionless_packing_case(const Effort& effort) {
 
 CaseResult packing_of_two_sizes_case(const Effort& effort) {
   CaseResult result;
-  const std::int64_t grains = effort.brief ? 250 : 1000;
+  const std::int64_t grains = effort.brief ? 125 : 1000;
   const Packings equal = pack(grains, 0, effort, result);
   const Packings mixed = pack(grains, 0, effort, result, {0.5, 0.7});
   // By 0.0658 times the deviation of the sizes over their mean, which is 1/6; their skewness is 0.
@@ -108,7 +108,7 @@ CaseResult packing_of_two_sizes_case(const Effort& effort) {
   const double more = 0.0658 / 6, part = 0.003;
   Measure beyond{"beyond that of equal ones", mixed.solid_fraction.value - equal.solid_fraction.value,
                  std::hypot(mixed.solid_fraction.error, equal.solid_fraction.error)};
-  // 250 grains scatter by more than sizes change.
+  // So few grains scatter by more than sizes change.
   if (!effort.brief) beyond.low = more - part, beyond.high = more + part, beyond.source = desmond_weeks;
   result.measures = {{"solid fraction", mixed.solid_fraction.value, mixed.solid_fraction.error},
                      beyond,

@@ -105,11 +105,12 @@ TEST(CertificateScenes, OneSeedIsOneScene) {
 
 TEST(CertificateScenes, OfEveryFamilyAreOfItsSizeAndRun) {
   for (const SceneFamily& family : scene_families())
-    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       MadeScene made = make_scene(family.name, seed, {});
-      made.scene.setup.solver.direct_bodies = 0;  // whether its steps are right is not asked here
       EXPECT_GE(made.grains.size(), 1U);
       EXPECT_LE(made.grains.size(), 200U) << made.name();
+      if (seed > 1) continue;
+      made.scene.setup.solver.direct_bodies = 0;  // whether its steps are right is not asked here
       const AuditedRun run = audited(made, 2);
       EXPECT_EQ(run.ended, "") << made.name();
       for (const AuditedStep& step : run.steps)
@@ -127,15 +128,14 @@ TEST(CertificateScenes, OfASizeHaveSoManyTimesTheGrains) {
 TEST(CertificateAudit, OfAChainOfHundredsOfGrainsFindsTheirForces) {
   // Hardly bent, between walls, in a cluster far beyond what is small by its bodies alone: with wall forces
   // that had ceased to change it was certified with next to nothing of what the walls carry.
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    const AuditedRun run = audited(make_scene("chain", seed, {.size = 8}), 4);
-    for (const AuditedStep& step : run.steps) {
-      EXPECT_TRUE(step.certified) << seed << " step " << step.step;
-      ASSERT_EQ(step.judged, Judged::yes) << step.why;
-      EXPECT_LT(std::max({step.errors.velocity, step.errors.wall_force, step.errors.contact_force}),
-                step.claimed)
-          << seed << " step " << step.step;
-    }
+  const AuditedRun run = audited(make_scene("chain", 1, {.size = 8}), 4);
+  ASSERT_EQ(run.steps.size(), 4U);
+  for (const AuditedStep& step : run.steps) {
+    EXPECT_TRUE(step.certified) << step.step;
+    ASSERT_EQ(step.judged, Judged::yes) << step.why;
+    EXPECT_LT(std::max({step.errors.velocity, step.errors.wall_force, step.errors.contact_force}),
+              step.claimed)
+        << step.step;
   }
 }
 
@@ -194,7 +194,7 @@ TEST(CertificateAudit, OfASolverThatStopsAfterOneSweepFindsItFarFromItsAnswer) {
 TEST(CertificateAudit, OfASolverThatGoesOnFindsItNearItsAnswer) {
   int judged = 0;
   for (const char* family : {"deposition", "flight", "column"})
-    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       const AuditedRun run = audited(make_scene(family, seed, {}), 2, [](io::Scene& scene) {
         scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-8;
         scene.setup.solver.max_iterations = 20000;
@@ -206,7 +206,7 @@ TEST(CertificateAudit, OfASolverThatGoesOnFindsItNearItsAnswer) {
         EXPECT_LT(step.errors.velocity, 1e-5) << family << " " << seed << " step " << step.step;
       }
     }
-  EXPECT_GE(judged, 6);
+  EXPECT_GE(judged, 4);
 }
 
 /// Certified steps that were judged: their number. None of them may be further off than it claims.
@@ -264,15 +264,15 @@ TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDe
   // In step 2 rows of five grains, which lean by 10^-4, still close by 10^-7 m/s where others part by 10^-2.
   MadeScene made = make_scene("lattice", 1036, {});
   made.scene.setup.decomposition.subdomains = 7;
-  const AuditedRun run = audited(made, 20);
+  const AuditedRun run = audited(made, 3);
   EXPECT_GE(within_their_claims(run), 1);
 }
 
 TEST(CertificateAudit, OfALatticeWithFrictionWhoseForcesComeSlowlyIsNotDeceived) {
   // In step 15 of a cold start proximal steps a thousand times softer than the firmest changed next to
   // nothing, 15 % of the largest force away from an answer.
-  const AuditedRun run = audited(make_scene("lattice", 880, {}), 20);
-  EXPECT_GE(within_their_claims(run), 10);
+  const AuditedRun run = audited(make_scene("lattice", 880, {}), 15);
+  EXPECT_GE(within_their_claims(run), 8);
 }
 
 TEST(CertificateAudit, OfALatticeThatWallsPressByFarMoreThanMovesItIsNotDeceived) {
@@ -285,8 +285,8 @@ TEST(CertificateAudit, OfALatticeThatWallsPressByFarMoreThanMovesItIsNotDeceived
 
 TEST(CertificateAudit, OfAChainWhoseSlidingTurnsSlowlyIsNotDeceived) {
   // In step 9 two rounds agreed, each of which had turned sliding by a thousandth of what was missing.
-  const AuditedRun run = audited(make_scene("chain", 71071, {}), 20);
-  EXPECT_GE(within_their_claims(run), 15);
+  const AuditedRun run = audited(make_scene("chain", 71071, {}), 9);
+  EXPECT_GE(within_their_claims(run), 7);
 }
 
 TEST(CertificateAudit, OfAColumnBesideFastGrainsThatTouchItIsOfTheColumnAlone) {
