@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <span>
@@ -113,6 +114,7 @@ void place_sample(Prepared& run) {
     run.sample = build_sample(run.scene, std::move(state.sample));
     run.forces = std::move(state.forces);
     place_walls_of(state.walls, run.scene);
+    run.warnings = warnings_of_surfaces(state.walls, run.scene);
   } else {
     run.sample = build_sample(run.scene);
   }
@@ -174,7 +176,7 @@ void print_warnings(const Terminal& terminal, const Prepared& run) {
 /// What is to be said of the sample.
 void speak_of_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
   run.wall_mass = io::automatic_wall_mass(run.sample);
-  run.warnings = scene_warnings(run.scene, run.sample);
+  std::ranges::move(scene_warnings(run.scene, run.sample), std::back_inserter(run.warnings));
   if (!options.dry_run) return;
   print_warnings(terminal, run);
   print_out("{}", io::resolved_scene(run.scene));

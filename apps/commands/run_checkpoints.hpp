@@ -60,7 +60,7 @@ class CheckpointKeeper {
   /// Collective, behind Simulation::begin_next_stage(). `memory`: but for what the keeper counts itself.
   /// False, on all ranks, when it could not be written: earlier ones are there still, and rank 0 says why.
   /// `counts`: for archive_every. One that is written only since the run ends here does not: where a run is
-  /// stopped must not choose which states stay.
+  /// stopped must not choose which states stay, where checkpoints go by steps or by time simulated.
   bool save(const Simulation& simulation, RunMemory memory, bool counts);
 
   std::optional<std::int64_t> last_step() const { return last_step_; }  ///< of the last checkpoint

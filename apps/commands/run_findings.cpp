@@ -19,7 +19,7 @@ std::string remedy_of_overlaps(const Tally& tally, const std::vector<Wall>& wall
     text = fmt::format(". A time_step of {:.2g} s would do", *enough);
   const std::int64_t with = tally.deepest.overlapping->with;
   if (with >= 0 || walls[static_cast<std::size_t>(-1 - with)].from_stage.empty()) return text;
-  return text + fmt::format("; but where grains stood as that wall appeared, in stage '{}', none will",
+  return text + fmt::format(". Where grains stood as that wall appeared, in stage '{}', no time_step will",
                             walls[static_cast<std::size_t>(-1 - with)].from_stage);
 }
 

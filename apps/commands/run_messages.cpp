@@ -68,7 +68,7 @@ void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
 }
 
 std::optional<double> Tally::enough_time_step() const {
-  if (sufficient_time_step == 0 || jammed > 0) return std::nullopt;
+  if (sufficient_time_step == 0 || jammed > 0 || passed > 0) return std::nullopt;
   return sufficient_time_step;
 }
 
@@ -149,12 +149,11 @@ std::string remedy_of_misses(const io::Summary& summary) {
 }  // namespace
 
 std::string note_of_direct_solves(const Simulation& simulation, const Tally& tally, double seconds) {
-  const bool most = tally.small > seconds && tally.small > 0.5 * tally.lately;
+  const bool most = tally.small > seconds && tally.small > DirectSolveCost{}.part * tally.lately;
   if (simulation.setup().solver.direct_bodies == 0 || !most) return "";
   return fmt::format(
       "direct solves of small clusters, which show how far their velocities and forces are off, took {:.3g} "
-      "of "
-      "the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
+      "of the {:.3g} s of the iterations; solver.direct_bodies = 0 leaves that to estimates "
       "(docs/certificate.md)",
       tally.small, tally.lately);
 }
@@ -168,8 +167,8 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         "waiting for them took {:.1f} % of the iterations on rank 0",
         messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
         tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
-  constexpr double worth_a_word = 1;  // s
-  if (const std::string note = note_of_direct_solves(simulation, tally, worth_a_word); !note.empty())
+  if (const std::string note = note_of_direct_solves(simulation, tally, DirectSolveCost{}.at_end);
+      !note.empty())
     terminal.say("{}", note);
 }
 

@@ -43,8 +43,9 @@ struct Tally {
   /// An overlap is at most the time step times a speed (docs/theory.md, "Gap term and restitution"): the step
   /// that made one would have kept within the tolerance at a time step smaller by as much as it was missed.
   void add_overlap(const Simulation& simulation);
-  /// [s] at which overlaps would have stayed within their tolerance; none where that is not known, or where
-  /// walls close on grains: no time step is short enough for these.
+  /// [s] at which overlaps would have stayed within their tolerance; none where that is not known, where
+  /// walls close on grains, for which no time step is short enough, or where grains went through one another
+  /// or deep into them, which their overlap does not show.
   std::optional<double> enough_time_step() const;
   /// Fills in steps, iterations and worst errors; `last` is the report of the last step.
   void sum_up(const StepReport& last, io::Summary& summary) const;
@@ -71,8 +72,14 @@ std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls);
 /// Grains that came and went, messages of an exchange, and the time of direct solves.
 void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally);
 
-/// What direct solves of small clusters cost, where that is more than `seconds` and half of the iterations;
-/// else "".
+/// When the cost of direct solves is worth a word: more than so many seconds [s], and this part of the
+/// iterations. Under way, so that who watches may stop a long run and resume it, or begin anew, without.
+struct DirectSolveCost {
+  double at_end = 1, under_way = 20;
+  double part = 0.5;
+};
+
+/// What direct solves of small clusters cost, where that is more than `seconds`; else "".
 std::string note_of_direct_solves(const Simulation& simulation, const Tally& tally, double seconds);
 
 /// What came of the run, of which the results are in `directory`.

@@ -65,11 +65,10 @@ class Lines {
   void finish() {
     for (io::Progress& line : lines_) line.finish();
   }
-  /// Once, while it can be changed yet.
+  /// Once, while the run goes on.
   void tell_cost(const PreparedRun& run, const Simulation& simulation, const Tally& tally) {
-    constexpr double patience = 20;  // s
     if (lines_.empty() || told_) return;
-    const std::string note = note_of_direct_solves(simulation, tally, patience);
+    const std::string note = note_of_direct_solves(simulation, tally, DirectSolveCost{}.under_way);
     if (note.empty()) return;
     told_ = true;
     finish();

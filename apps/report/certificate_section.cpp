@@ -63,16 +63,6 @@ std::string verdict(const RunFolder& run, std::size_t steps, std::size_t missed)
          "bodies.";
 }
 
-/// What the run warned of under `key` of its summary.
-std::vector<std::string> sentences(const RunFolder& run, const char* key) {
-  const auto found = run.summary.find(key);
-  if (found == run.summary.end() || !found->is_array()) return {};
-  std::vector<std::string> all;
-  for (const nlohmann::json& sentence : *found)
-    if (sentence.is_string()) all.push_back(sentence.get<std::string>());
-  return all;
-}
-
 /// The loosest bound of any stage; 0: not known.
 double velocity_allowed(const RunFolder& run) {
   if (!run.scene) return 0;
@@ -89,9 +79,8 @@ HtmlSections certificate_section(const RunFolder& run) {
   const SolverSettings solver = run.scene ? run.scene->setup.solver : SolverSettings{};
   const auto missed = static_cast<std::size_t>(std::count(converged.begin(), converged.end(), 0.0));
   io::HtmlSection section{"May it be believed?", verdict(run, converged.size(), missed)};
-  for (const auto& [key, when] :
-       {std::pair{"warnings", "Of the scene"}, std::pair{"findings", "Of the steps"}})
-    for (const std::string& sentence : sentences(run, key)) section.table.rows.push_back({when, sentence});
+  for (const auto& finding : run.summary.value("findings", nlohmann::json::array()))
+    if (finding.is_string()) section.table.rows.push_back({"warning", finding.get<std::string>()});
   section.text +=
       " Where steps are many, the worst of each stretch is drawn; what is below a ten-thousandth of its "
       "tolerance is drawn there.";

@@ -171,9 +171,9 @@ void check(const io::Scene& scene, const Sample& sample) {
           "give lengths in m and densities in kg/m^3",
           sample.radius[k], sample.density_of(k), m, least_mass, most_mass));
     const auto near = [](double number) { return std::abs(number) <= farthest; };
-    if (!near(sample.x[k].cwiseAbs().maxCoeff())) refuse("its centre is beyond 1e15 m");
+    if (!near(sample.x[k].cwiseAbs().maxCoeff())) refuse("its centre must be within 1e15 m");
     if (!sample.velocity.empty() && !std::ranges::all_of(sample.velocity[k], near))
-      refuse("its velocity, or radius times angular velocity, is beyond 1e15 m/s");
+      refuse("its velocity, and radius times angular velocity, must be within 1e15 m/s");
     if (!sample.velocity.empty() && sample.shape.number != 0 &&
         std::any_of(sample.velocity[k].begin() + 3, sample.velocity[k].end(),
                     [](double w) { return w != 0; }))

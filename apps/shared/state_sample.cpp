@@ -109,6 +109,7 @@ StateSample state_of_checkpoint(const io::Scene& scene) {
     const Wall& wall = before.setup.walls[w];
     const Vec3 point(&head.wall_points.at(3 * w)), velocity(&head.wall_velocities.at(3 * w));
     state.walls.push_back({wall.name, wall.normal.dot(point), wall.normal.dot(velocity), Vec3::Zero()});
+    state.walls.back().pose.moved = wall.surface() != nullptr && !wall.motion.empty();
   }
   state.domain = before.setup.domain;
   state.clumps = !before.setup.clumps.empty();
@@ -188,6 +189,20 @@ void place_walls_of(const std::vector<WallReport>& walls, io::Scene& scene) {
     wall.point[axis] = wall.normal[axis] * found->position;
     if (wall.load.pushed() && wall.velocity.isZero(0)) wall.velocity = found->velocity * wall.normal;
   }
+}
+
+std::vector<std::string> warnings_of_surfaces(const std::vector<WallReport>& walls, const io::Scene& scene) {
+  std::vector<std::string> warnings;
+  for (const Wall& wall : scene.setup.walls) {
+    const auto found = std::ranges::find(walls, wall.name, &WallReport::name);
+    if (wall.surface() == nullptr || found == walls.end() || !found->pose.moved) continue;
+    warnings.push_back(
+        fmt::format("wall '{}' had moved in the run that the state is of, and begins where this scene puts "
+                    "it: grains that "
+                    "stood on it may overlap it, or stand free. Put it where it was, or `--resume` that run",
+                    wall.name));
+  }
+  return warnings;
 }
 
 }  // namespace talus

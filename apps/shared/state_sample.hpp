@@ -29,4 +29,8 @@ StateSample read_state(const io::Scene& scene);
 /// velocities. Before io::place_walls.
 void place_walls_of(const std::vector<WallReport>& walls, io::Scene& scene);
 
+/// A sentence for each surface of the scene that had moved or turned in that run: it begins where the scene
+/// puts it, and grains that stood on it may overlap it there.
+std::vector<std::string> warnings_of_surfaces(const std::vector<WallReport>& walls, const io::Scene& scene);
+
 }  // namespace talus

@@ -23,12 +23,15 @@ struct GapNumbers {
   double h, alert, turning, slow, E;
 };
 
+/// Whether bodies carry in the run, where their gap may be rounding and does not tell; `gap_tells` elsewhere.
+enum class InRun { gap_tells, carry, do_not };
+
 /// A pair on its way through the step.
 struct Approach {
   double gap;     ///< in the middle of the step [m]
   double v_n;     ///< before the step [m/s]
   double v_free;  ///< at its end without contacts [m/s]
-  bool closed;    ///< the run says that there is none, and it may be rounding
+  InRun in_run;
 };
 
 /// Bodies that attract one another touch up to this gap, over the smaller radius.
@@ -43,8 +46,11 @@ bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, 
   if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
   bias = std::max(0.0, pair.gap) / numbers.h;
   if (restitution > 0 && (numbers.slow == 0 || std::abs(pair.v_n) > numbers.slow)) {
+    // An elastic pair that touches is a contact, and one that nearly does is none.
+    const bool apart = pair.in_run == InRun::do_not && restitution >= 1 && pair.v_n >= 0;
+    if (apart && pair.gap <= 0) return false;
     const bool closes = pair.v_n < 0 && pair.gap + numbers.h * pair.v_free < 0;
-    if (pair.gap <= 0 || pair.closed || (closes && pair.gap < numbers.turning))
+    if (pair.gap <= 0 || pair.in_run == InRun::carry || (closes && pair.gap < numbers.turning))
       bias = restitution * pair.v_n;
     else if (closes || (restitution >= 1 && pair.gap > reach))
       return false;
@@ -155,10 +161,10 @@ class Builder {
   const PairLaw& law(Material a, Material b) const { return in_.stage.laws.between(a, b); }
 
   /// StepInput::after, of a grain and another body: the other grain's id, or -1 - w of a wall.
-  bool closed_in_run(double gap, std::size_t k, std::int64_t other) const {
-    if (!(gap > 0 && gap <= roundings_of_gap * made_.rounding_speed * numbers_.h)) return false;
+  InRun in_run(double gap, std::size_t k, std::int64_t other) const {
+    if (std::abs(gap) > roundings_of_gap * made_.rounding_speed * numbers_.h) return InRun::gap_tells;
     const std::int64_t id = in_.before.id[k];
-    return carry_.contains({id, other}) || carry_.contains({other, id});
+    return carry_.contains({id, other}) || carry_.contains({other, id}) ? InRun::carry : InRun::do_not;
   }
 
   /// A ball of a body, in the middle of the step; of a sphere it is the sphere.
@@ -211,9 +217,10 @@ class Builder {
     give_levers(contact, centre(one) - (one.radius + gap / 2) * normal);
     const double v_n = normal.dot(velocity_before(contact) - cell.rates * k);
     const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
-    const bool closed = closed_in_run(gap, i, in_.before.id[j]);
     const double reach = held.reach * std::min(one.radius, other.radius);
-    if (!meets(numbers_, {gap, v_n, v_n, closed}, pair.restitution, reach, contact.bias)) return;
+    if (!meets(numbers_, {gap, v_n, v_n, in_run(gap, i, in_.before.id[j])}, pair.restitution, reach,
+               contact.bias))
+      return;
     contact.pull = gap <= reach ? acts_ * held.force : 0;
     made_.contacts.push_back(contact);
     const double one_radius = in_.before.radius[i], other_radius = in_.before.radius[j];
@@ -329,9 +336,9 @@ class Builder {
       give_levers(contact, point);
       const double gap = touch.distance - ball.radius,
                    v_n = touch.normal.dot(velocity_before(contact) - of_wall - contact.drift);
-      const bool closed = closed_in_run(gap, i, -1 - static_cast<std::int64_t>(w));
+      const InRun carries = in_run(gap, i, -1 - static_cast<std::int64_t>(w));
       const double reach = held.reach * ball.radius;
-      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), closed}, pair.restitution, reach,
+      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), carries}, pair.restitution, reach,
                  contact.bias))
         continue;
       if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, contact.drift.norm());

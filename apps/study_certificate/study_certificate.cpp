@@ -244,7 +244,8 @@ void add_study_certificate_options(CLI::App& app, StudyCertificateOptions& optio
   app.add_option("--scenes-from", options.scenes_from,
                  "a scene file, or a folder of them, instead of made ones")
       ->type_name("PATH")
-      ->check(CLI::ExistingPath);
+      ->check(CLI::ExistingPath)
+      ->excludes("--scenes", "--seed", "--size", "--families");
   app.add_option("--keep", options.keep, "worst scenes that are kept as files, for each tolerance")
       ->type_name("N")
       ->capture_default_str()

@@ -2,13 +2,12 @@
 
 #include <chrono>
 #include <stdexcept>
-#include <system_error>
 #include <thread>
 
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/rehearsal.hpp"
 #include "io/files/error.hpp"
-#include "io/results/detail/directory_undo.hpp"
+#include "io/results/detail/patient_read.hpp"
 #include "io/results/results.hpp"
 #include "runtime/step/cell_flow.hpp"
 
@@ -115,28 +114,23 @@ constexpr const char* instead_of_results =
     "give a checkpoint of the run in its place, or run the scene anew (where a run is writing a frame it may "
     "look so for a moment: try again)";
 
-/// A frame is written within milliseconds, and a reader that looks in between meets half of a directory.
-struct Looks {
-  int most = 20;                          ///< before the file is called damaged
-  std::chrono::milliseconds between{50};  ///< one look and the next
+/// How long a reader waits for the writer of a frame, in all and between two looks.
+struct Patience {
+  std::chrono::milliseconds in_all{1000}, between{50};
 };
 
 /// What `read` returns of a file that a run may write to meanwhile. Throws FileError.
 template <class Read>
 auto read_while_written(const std::string& path, const Read& read) {
   const detail::QuietHdf5 quiet;
-  std::error_code unknown;
-  for (int look = 1;; ++look) {
-    const auto before = std::filesystem::last_write_time(path, unknown);
-    try {
-      return detail::rehearsed(path, instead_of_results, read);
-    } catch (const FileError&) {
-      const bool written =
-          detail::directory_is_kept(path) || std::filesystem::last_write_time(path, unknown) != before;
-      if (look == Looks{}.most || !written) throw;
-    }
-    std::this_thread::sleep_for(Looks{}.between);
-  }
+  const auto until = std::chrono::steady_clock::now() + Patience{}.in_all;
+  const auto wait = [&] {
+    if (std::chrono::steady_clock::now() > until) return false;
+    std::this_thread::sleep_for(Patience{}.between);
+    return true;
+  };
+  return detail::read_patiently(
+      path, [&] { return detail::rehearsed(path, instead_of_results, read); }, wait);
 }
 
 }  // namespace

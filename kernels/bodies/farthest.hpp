@@ -2,8 +2,8 @@
 
 namespace talus {
 
-/// No coordinate [m], length [m] or speed [m/s] of a scene is larger: beyond it a double tells no two grains
-/// apart, and squares and numbers of cells leave their types.
+/// Coordinates [m] and velocities [m/s] of grains, and coordinates and lengths of surfaces [m], are refused
+/// beyond it: squares, and numbers of cells of the detection, would leave their types.
 inline constexpr double farthest = 1e15;
 
 }  // namespace talus

@@ -1,7 +1,6 @@
 #include "kernels/detection/domain.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -73,17 +72,6 @@ Domain periodic_domain(const Vec3& lengths, const Vec3& low, const Vec3& shears)
   const bool x = lengths[0] > 0, y = lengths[1] > 0, z = lengths[2] > 0;
   if ((shears[0] != 0 && !(x && y)) || (shears[1] != 0 && !(x && z)) || (shears[2] != 0 && !(y && z)))
     refuse("a shear needs two axes that repeat");
-  // By whole edges a cell leans to no other places; and a place must keep digits for what is small beside the
-  // cell.
-  constexpr double most_lean = 2, farthest = 1e9;
-  const double edges[] = {std::max(lengths[0], lengths[1]), std::max(lengths[0], lengths[2]),
-                          std::max(lengths[1], lengths[2])};
-  for (const Eigen::Index k : {0, 1, 2}) {
-    if (std::abs(shears[k]) > most_lean * edges[k])
-      refuse("a shear is more than twice the longer of its edges");
-    if (lengths[k] > 0 && std::abs(low[k]) > farthest * lengths[k])
-      refuse("origin is more than 1e9 lengths away, where places have too few digits");
-  }
   Domain domain;
   domain.cell = {lengths[0], lengths[1],          lengths[2],          shears[0],          shears[1],
                  shears[2],  inverse(lengths[0]), inverse(lengths[1]), inverse(lengths[2])};

@@ -92,8 +92,7 @@ struct Domain {
 
 /// A cell with the edges `lengths` [m], 0 along an axis of walls, and the shears (xy, xz, yz) [m] of
 /// PeriodicSpace. Throws std::invalid_argument unless lengths are finite and >= 0, one of them is positive,
-/// shears are between axes that repeat and at most twice the longer of their edges, and `low` at most 1e9
-/// lengths away.
+/// and shears are between axes that repeat.
 Domain periodic_domain(const Vec3& lengths, const Vec3& low = Vec3::Zero(),
                        const Vec3& shears = Vec3::Zero());
 

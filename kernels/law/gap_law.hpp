@@ -14,7 +14,7 @@ struct GapRule {
   double time_step;    ///< h [s]
   double alert;        ///< [m]
   double restitution;  ///< e in [0, 1], where pairs have none of their own
-  double slow;         ///< [m/s] no restitution up to here, 2 h |gravity|; without gravity nothing is at rest
+  double slow;         ///< [m/s] no restitution up to here, 2 h |gravity|; 0: all pairs have it
   double turning = std::numeric_limits<double>::infinity();  ///< [m] an impact turns no earlier than this
   double reflection = 0;  ///< E of Moreau's law (restitution_law.hpp); 0: the bias is that of v_n
   double reach = 0;       ///< of cohesion over the smaller radius, where pairs have none of their own
@@ -40,12 +40,12 @@ struct GapResult {
 };
 
 /// Inelastic quasi-Signorini, b = max(g, 0)/h: no more than the gap is used up. With restitution, a pair
-/// faster than `slow` that touches, or would meet within the step, follows the impact law instead, b = e v_n:
-/// once braked to g/h, it would have lost the speed that is to rebound. Where it is as far as `turning`
-/// others may stand between, and it flies on until it overlaps. Pairs that others push together within the
-/// step are braked; that costs energy, so with e = 1 they fly on, too, but within `reach` [m], where they may
-/// be pulled back. `v_n` [m/s] is the normal velocity at the beginning of the step, `v_n_free` the one at its
-/// end without contacts. `restitution` is a number, or one per lane.
+/// faster than `slow`, or of any speed where that is 0, that touches, or would meet within the step, follows
+/// the impact law instead, b = e v_n: once braked to g/h, it would have lost the speed that is to rebound.
+/// Where it is as far as `turning` others may stand between, and it flies on until it overlaps. Pairs that
+/// others push together within the step are braked; that costs energy, so with e = 1 they fly on, too, but
+/// within `reach` [m], where they may be pulled back. `v_n` [m/s] is the normal velocity at the beginning of
+/// the step, `v_n_free` the one at its end without contacts. `restitution` is a number, or one per lane.
 template <class V, class E>
 [[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free,
                                                      E restitution, V reach = {}) {
@@ -60,7 +60,8 @@ template <class V, class E>
     absent |= quick & (meets == BitsOf<V>{}) &
               (closes | ((V{} + restitution >= 1) & ((gap <= reach) == BitsOf<V>{})));
   };
-  // Without gravity a pair that rests is no other than one that moves by rounding: with e = 1 both fly on.
+  // Without gravity v_n = 0 is a speed like any other: what rests must not differ from what moves by
+  // rounding.
   const double slow = rule.slow > 0 ? rule.slow : -1;
   if constexpr (std::same_as<E, double>) {
     if (restitution > 0) impact(absolute(v_n) > slow);

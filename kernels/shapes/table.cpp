@@ -30,12 +30,14 @@ void make_surface(WallShape& shape) {
   const ShapeEntry* entry = wall_shape(shape.name);
   if (entry == nullptr) return;
   const auto near = [](double length) { return std::abs(length) <= farthest; };
-  for (const auto& [name, numbers] : shape.values.number)
-    if (!std::ranges::all_of(numbers, near)) throw std::invalid_argument(name + " is beyond 1e15 m");
+  for (const ShapeParameter& parameter : entry->parameters)
+    if (const auto found = shape.values.number.find(parameter.name);
+        found != shape.values.number.end() && !std::ranges::all_of(found->second, near))
+      throw std::invalid_argument(parameter.name + std::string(" must be within 1e15 ") + parameter.unit);
   for (const Triangle& triangle : shape.values.triangles)
     for (const Vec3& corner : triangle)
       if (!near(corner.cwiseAbs().maxCoeff()))
-        throw std::invalid_argument("a corner of the mesh is beyond 1e15 m");
+        throw std::invalid_argument("corners of the mesh must be within 1e15 m");
   shape.surface = entry->make(shape.values);
   shape.values.triangles = {};
 }

@@ -145,6 +145,30 @@ bool any_stress(const Setup& setup) {
   return std::ranges::any_of(setup.stages, [](const Stage& stage) { return stage.stress.any(); });
 }
 
+namespace {
+
+/// How a cell may lie and lean. A lean by whole edges gives the same images, so that no larger one is needed;
+/// farther away places have too few digits for what is small beside the cell.
+struct CellLimits {
+  double lean = 2;        ///< a shear over the longer of its edges, >= 1
+  double distance = 1e9;  ///< the origin over an edge, > 1
+};
+
+void validate_place(const Domain& domain) {
+  const Vec3 edges = domain.edges();
+  const double shears[] = {domain.cell.xy, domain.cell.xz, domain.cell.yz};
+  constexpr Eigen::Index axes[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+  constexpr CellLimits limits;
+  for (const Eigen::Index k : {0, 1, 2}) {
+    if (std::abs(shears[k]) > limits.lean * std::max(edges[axes[k][0]], edges[axes[k][1]]))
+      throw std::invalid_argument("a shear is more than twice the longer of its edges");
+    if (edges[k] > 0 && std::abs(domain.low[k]) > limits.distance * edges[k])
+      throw std::invalid_argument("its origin is more than 1e9 edges away");
+  }
+}
+
+}  // namespace
+
 void validate_cell(const Setup& setup) {
   if (!(setup.cell_inertia > 0 && std::isfinite(setup.cell_inertia)))
     throw std::invalid_argument("cell: inertia must be a number > 0");
@@ -153,6 +177,7 @@ void validate_cell(const Setup& setup) {
     validate_stress(setup, stage);
   }
   if (!setup.domain.repeats) return;
+  validate_place(setup.domain);
   const auto refuse = [](const std::string& what) { throw std::invalid_argument(what); };
   for (const Wall& wall : setup.walls) {
     if (wall.surface() != nullptr)

@@ -10,6 +10,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -101,7 +102,7 @@ def run(
     """
     from .scene import Scene
 
-    if int(ranks) != ranks or ranks < 1:
+    if not isinstance(ranks, Integral) or ranks < 1:
         raise ValueError(f"ranks must be a whole number, 1 or more, got {ranks}")
     if isinstance(options, str):
         raise TypeError(f"options are a list of words, [{', '.join(repr(word) for word in options.split())}], not one text")
@@ -122,7 +123,7 @@ def run(
         written.put(replace=force or resume)
     words = [talus, "run", str(path), "--out", str(directory)]
     if ranks > 1:
-        words = ["mpirun", "-n", str(int(ranks)), *words]
+        words = ["mpirun", "-n", str(ranks), *words]
     if threads is not None:
         words += ["--threads", str(threads)]
     words += ["--force"] * force + ["--resume"] * resume + list(options)

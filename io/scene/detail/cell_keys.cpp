@@ -17,13 +17,13 @@ Section<CellSpec> cell_keys() {
               "which contacts are looked for; 0: no repetition along that axis.",
               &C::lengths)
            .need(),
-       key<C>("origin", "m", any, "Lower corner of the cell.", &C::origin)
+       key<C>("origin", "m", any, "Lower corner of the cell, at most 1e9 of its edges away.", &C::origin)
            .blank_when_zero()
            .or_else("`[0.0, 0.0, 0.0]`"),
        key<C>(
            "shears", "m", any,
            "Of a sheared cell: by how much the upper face along y is displaced along x, that along z along "
-           "x, and that along z along y.",
+           "x, and that along z along y; each at most twice the longer of its two edges.",
            &C::shears)
            .blank_when_zero()
            .or_else("`[0.0, 0.0, 0.0]`"),

@@ -264,7 +264,7 @@ TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDe
   // In step 2 rows of five grains, which lean by 10^-4, still close by 10^-7 m/s where others part by 10^-2.
   MadeScene made = make_scene("lattice", 1036, {});
   made.scene.setup.decomposition.subdomains = 7;
-  const AuditedRun run = audited(made, 3);
+  const AuditedRun run = audited(made, 6);
   EXPECT_GE(within_their_claims(run), 1);
 }
 

@@ -94,7 +94,7 @@ TEST_F(Grains, ARunThatWasStoppedGoesOnToTheSameBitsAndTables) {
 TEST_F(Grains, ThatNeverFallDueAreWarnedOf) {
   const Outcome outcome = run(replaced(rain, "from = 0.05", "from = 50"), "--out out");
   EXPECT_EQ(outcome.code, 0) << outcome.messages;
-  EXPECT_NE(outcome.messages.find("insert 'sand' placed no grain, as none was due"), std::string::npos)
+  EXPECT_NE(outcome.messages.find("insert 'sand' placed no grain: none was due"), std::string::npos)
       << outcome.messages;
   EXPECT_EQ(outcome.messages.find("insert 'glass' placed no grain"), std::string::npos) << outcome.messages;
 }

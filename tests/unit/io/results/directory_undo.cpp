@@ -8,9 +8,9 @@
 #include <fstream>
 #include <iterator>
 #include <random>
-#include <thread>
 
 #include "io/files/error.hpp"
+#include "io/results/detail/patient_read.hpp"
 #include "io/results/results.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
@@ -99,18 +99,35 @@ TEST(DirectoryUndo, TellsReadersToLookAgain) {
   io::ResultsWriter writer(path, {"floor"});
   writer.append(frame_of(0));
   const std::string whole = bytes_of(path);
+  const auto tear = [&] { fs::resize_file(path, whole.size() / 2); };
+  const auto mend = [&] { std::ofstream(path, std::ios::binary) << whole; };
+  const auto frames = [&] { return io::frame_count(path); };
+  tear();
   std::ofstream(undo, std::ios::binary) << "kept";
-  fs::resize_file(path, whole.size() / 2);
-  std::thread finishes([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(120));
-    std::ofstream(path, std::ios::binary) << whole;
-    fs::remove(undo);
-  });
-  EXPECT_EQ(io::frame_count(path), 1U);
-  finishes.join();
-  EXPECT_EQ(io::read_frame(path, 0).step, 0);
-  fs::resize_file(path, whole.size() / 2);
-  EXPECT_THROW(io::frame_count(path), io::FileError) << "nobody writes to it";
+  int waits = 0;
+  const auto wait = [&] {
+    if (++waits == 3) mend(), fs::remove(undo);
+    return waits < 10;
+  };
+  EXPECT_EQ(io::detail::read_patiently(path.string(), frames, wait), 1U);
+  EXPECT_EQ(waits, 3);
+
+  // The writer ends while the reader looks: only the time of the file tells.
+  tear();
+  fs::last_write_time(path, fs::last_write_time(path) - std::chrono::hours(1));
+  int looks = 0;
+  const auto overtaken = [&] {
+    if (++looks > 1) return frames();
+    mend();
+    throw io::FileError(path.string(), "half a frame");
+  };
+  EXPECT_EQ(io::detail::read_patiently(path.string(), overtaken, [] { return true; }), 1U);
+
+  tear();
+  waits = 0;
+  EXPECT_THROW(io::detail::read_patiently(path.string(), frames, wait), io::FileError)
+      << "nobody writes to it";
+  EXPECT_EQ(waits, 0);
 }
 
 TEST(DirectoryUndo, LeavesOtherFilesAlone) {

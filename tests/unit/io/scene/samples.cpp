@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
+#include "apps/shared/state_sample.hpp"
 #include "io/scene/scene.hpp"
 
 namespace talus::io::samples_test {
@@ -108,6 +110,29 @@ TEST(Samples, MistakesAreNamedWithARemedy) {
       "100 per cent");
   expect(body + "name = \"a\"\nregion = { shape = \"box\", low = [0, 0, 0], high = [1, 1, 1] }\n",
          "only with: kind = lattice");
+}
+
+TEST(Samples, OfAStateWarnOfSurfacesThatHadMoved) {
+  const Scene scene = parse_scene(before + two + R"([[wall]]
+name = "shell"
+shape = "cylinder"
+start = [0, -1, 0]
+end = [0, 1, 0]
+radius = 3
+inside = true
+[[wall]]
+name = "floor"
+side = "z-"
+position = 0
+)" + after,
+                                  "samples.toml");
+  std::vector<WallReport> walls(3);
+  walls[0].name = "shell", walls[1].name = "floor", walls[2].name = "gone";
+  EXPECT_TRUE(warnings_of_surfaces(walls, scene).empty());
+  for (WallReport& wall : walls) wall.pose.moved = true;
+  const std::vector<std::string> warnings = warnings_of_surfaces(walls, scene);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("wall 'shell' had moved"), std::string::npos) << warnings[0];
 }
 
 }  // namespace
