@@ -191,12 +191,13 @@ BlockElimination CoulombStep::eliminated(const std::vector<Slope>& slope, double
 
 /// H S H^T of a contact. One that carries nothing has no moment either.
 void CoulombStep::add_blocks(std::size_t k, const Slope& slope, BlockElimination& system) const {
-  const auto& [blocks, H, rolls, turns] = columns_[k];
-  Freedoms::each_two(blocks, [&](std::size_t a, std::size_t b) {
-    if (!rolls) return system.add(blocks[a].block, blocks[b].block, H[a] * slope.force * H[b].transpose());
-    system.add(blocks[a].block, blocks[b].block,
-               (H[a] * slope.force + turns[a] * slope.moment_by_force) * H[b].transpose() +
-                   turns[a] * slope.moment * turns[b].transpose());
+  const Columns& of = columns_[k];
+  Freedoms::each_two(of.blocks, [&](std::size_t a, std::size_t b) {
+    const auto one = of.blocks[a].block, other = of.blocks[b].block;
+    if (!of.rolls) return system.add(one, other, of.H[a] * slope.force * of.H[b].transpose());
+    system.add(one, other,
+               (of.H[a] * slope.force + of.turns[a] * slope.moment_by_force) * of.H[b].transpose() +
+                   of.turns[a] * slope.moment * of.turns[b].transpose());
   });
 }
 

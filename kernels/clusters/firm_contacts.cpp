@@ -34,9 +34,10 @@ FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSp
       masses_(freedoms_.masses()),
       columns_(columns_of(problem, freedoms_, springs, moments)),
       system_(freedoms_, masses_, pairs_of(columns_)) {
-  for (const auto& [parts, stiffness] : columns_)
-    Freedoms::each_two(parts, [&](std::size_t a, std::size_t b) {
-      system_.add(parts[a].block, parts[b].block, stiffness * parts[a].value * parts[b].value.transpose());
+  for (const Column& column : columns_)
+    Freedoms::each_two(column.parts, [&](std::size_t a, std::size_t b) {
+      const Freedoms::Part &one = column.parts[a], &other = column.parts[b];
+      system_.add(one.block, other.block, column.stiffness * one.value * other.value.transpose());
     });
   system_.factorise();
 }
