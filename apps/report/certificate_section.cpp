@@ -79,8 +79,8 @@ HtmlSections certificate_section(const RunFolder& run) {
   const SolverSettings solver = run.scene ? run.scene->setup.solver : SolverSettings{};
   const auto missed = static_cast<std::size_t>(std::count(converged.begin(), converged.end(), 0.0));
   io::HtmlSection section{"May it be believed?", verdict(run, converged.size(), missed)};
-  for (const auto& finding : run.summary.value("findings", nlohmann::json::array()))
-    if (finding.is_string()) section.table.rows.push_back({"warning", finding.get<std::string>()});
+  for (const std::string& finding : sentences_of(run, "findings"))
+    section.table.rows.push_back({"warning", finding});
   section.text +=
       " Where steps are many, the worst of each stretch is drawn; what is below a ten-thousandth of its "
       "tolerance is drawn there.";

@@ -39,6 +39,13 @@ std::string damage_of_frames(const std::filesystem::path& directory) {
   }
 }
 
+std::vector<std::string> sentences_of(const RunFolder& run, const char* key) {
+  std::vector<std::string> sentences;
+  for (const json& sentence : run.summary.value(key, json::array()))
+    if (sentence.is_string()) sentences.push_back(sentence.get<std::string>());
+  return sentences;
+}
+
 std::optional<io::Scene> resolved_scene(const std::filesystem::path& directory) {
   try {
     return io::parse_scene(resolved_text(directory), (directory / "scene.resolved.toml").string());

@@ -22,6 +22,9 @@ struct RunFolder {
   io::TableColumns steps;              ///< what sections ask of steps.csv
 };
 
+/// The sentences under `key` of its summary, "warnings" or "findings"; what is no text there is left out.
+std::vector<std::string> sentences_of(const RunFolder& run, const char* key);
+
 /// The files of a run that pictures, pages and other formats are made from, which none of them may replace.
 std::vector<std::filesystem::path> sources_in(const std::filesystem::path& directory);
 

@@ -257,8 +257,7 @@ HtmlSections scene_section(const RunFolder& run) {
   if (const auto bodies = run.summary.find("bodies_at_end");
       bodies != run.summary.end() && bodies->is_number_unsigned())
     rows.push_back({"grains at the end", fmt::format("{}", bodies->get<std::size_t>())});
-  for (const auto& warning : run.summary.value("warnings", nlohmann::json::array()))
-    if (warning.is_string()) rows.push_back({"warning", warning.get<std::string>()});
+  for (const std::string& warning : sentences_of(run, "warnings")) rows.push_back({"warning", warning});
   return {section};
 }
 

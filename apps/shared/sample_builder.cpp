@@ -170,9 +170,8 @@ void check(const io::Scene& scene, const Sample& sample) {
           "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg, which must lie in {} to {}; "
           "give lengths in m and densities in kg/m^3",
           sample.radius[k], sample.density_of(k), m, least_mass, most_mass));
-    const auto near = [](double number) { return std::abs(number) <= farthest; };
-    if (!near(sample.x[k].cwiseAbs().maxCoeff())) refuse("its centre must be within 1e15 m");
-    if (!sample.velocity.empty() && !std::ranges::all_of(sample.velocity[k], near))
+    if (!within_farthest(sample.x[k].cwiseAbs().maxCoeff())) refuse("its centre must be within 1e15 m");
+    if (!sample.velocity.empty() && !std::ranges::all_of(sample.velocity[k], within_farthest))
       refuse("its velocity, and radius times angular velocity, must be within 1e15 m/s");
     if (!sample.velocity.empty() && sample.shape.number != 0 &&
         std::any_of(sample.velocity[k].begin() + 3, sample.velocity[k].end(),

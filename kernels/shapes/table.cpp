@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "kernels/bodies/farthest.hpp"
@@ -29,14 +28,13 @@ const ShapeEntry* wall_shape(const std::string& name) {
 void make_surface(WallShape& shape) {
   const ShapeEntry* entry = wall_shape(shape.name);
   if (entry == nullptr) return;
-  const auto near = [](double length) { return std::abs(length) <= farthest; };
   for (const ShapeParameter& parameter : entry->parameters)
     if (const auto found = shape.values.number.find(parameter.name);
-        found != shape.values.number.end() && !std::ranges::all_of(found->second, near))
+        found != shape.values.number.end() && !std::ranges::all_of(found->second, within_farthest))
       throw std::invalid_argument(parameter.name + std::string(" must be within 1e15 ") + parameter.unit);
   for (const Triangle& triangle : shape.values.triangles)
     for (const Vec3& corner : triangle)
-      if (!near(corner.cwiseAbs().maxCoeff()))
+      if (!within_farthest(corner.cwiseAbs().maxCoeff()))
         throw std::invalid_argument("corners of the mesh must be within 1e15 m");
   shape.surface = entry->make(shape.values);
   shape.values.triangles = {};

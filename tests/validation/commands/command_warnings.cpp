@@ -122,19 +122,23 @@ TEST_F(Warnings, AreInTheSummaryOfTheRun) {
   EXPECT_NE(warnings[0].get<std::string>().find("2.6 kg/m^3"), std::string::npos);
 }
 
-/// One grain that a lid is driven on: no velocities keep both contacts from approaching.
-TEST_F(Warnings, OfWallsThatCloseOnGrainsThatCannotGetAway) {
+/// One grain on a floor that a lid touches, which comes down at `speed` [m/s].
+std::string under_a_lid(const std::string& speed) {
   std::string scene = with_bodies(column_scene);
   scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
-  scene += R"(
+  return scene + R"(
 [[wall]]
 name = "lid"
 side = "z+"
 position = 0.02
 drive = "velocity"
-velocity = [0, 0, -0.01]
-)";
-  write(at("scene.toml"), scene);
+velocity = [0, 0, -)" +
+         speed + "]\n";
+}
+
+/// No velocities keep both contacts from approaching.
+TEST_F(Warnings, OfWallsThatCloseOnGrainsThatCannotGetAway) {
+  write(at("scene.toml"), under_a_lid("0.01"));
   write(at("grains.csv"), "id,x,y,z,radius\n42,0,0,0.01,0.01\n");
   const Outcome outcome = run("run scene.toml --out results");
   EXPECT_EQ(outcome.code, 3) << outcome.messages;
@@ -143,20 +147,10 @@ velocity = [0, 0, -0.01]
   EXPECT_LT(summary(at("results")).at("iterations").get<int>(), 400) << "they end early";
 }
 
-// The grain begins in the lid. A shorter time step mends nothing where walls close on it, so none is
+// The lid goes into the grain. A shorter time step mends nothing where walls close on it, so none is
 // promised; and what the terminal said stands in the files as well.
 TEST_F(Warnings, OfTheEndStandInTheFilesAndPromiseNothingWhereStepsHaveNoSolution) {
-  std::string scene = with_bodies(column_scene);
-  scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
-  scene += R"(
-[[wall]]
-name = "lid"
-side = "z+"
-position = 0.02
-drive = "velocity"
-velocity = [0, 0, -0.5]
-)";
-  write(at("scene.toml"), scene);
+  write(at("scene.toml"), under_a_lid("0.5"));
   write(at("grains.csv"), "id,x,y,z,radius\n42,0,0,0.01,0.01\n");
   const Outcome outcome = run("run scene.toml --out results");
   EXPECT_EQ(outcome.code, 3) << outcome.messages;
