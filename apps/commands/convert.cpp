@@ -62,22 +62,33 @@ Conversion conversion_of(const ConvertOptions& options) {
   return todo;
 }
 
+/// What is to be converted cannot be read.
+struct UnreadableInput : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+Frame read(const Conversion& todo, std::size_t k) try {
+  return io::read_frame(todo.results, k, io::FrameParts::grains);
+} catch (const std::exception& error) {
+  throw UnreadableInput(error.what());
+}
+
 /// Neither format has contacts, nor shapes but spheres.
 Frame frame_of(const Conversion& todo, std::size_t k) {
-  Frame frame = io::read_frame(todo.results, k, io::FrameParts::grains);
+  Frame frame = read(todo, k);
   return todo.shapes.clump ? io::frame_of_balls(frame, todo.shapes) : frame;
 }
 
-void write_lammps(const Conversion& todo, const fs::path& part) {
-  std::ofstream file(part, std::ios::binary);
+void write_lammps(const Conversion& todo, const fs::path& draft) {
+  std::ofstream file(draft, std::ios::binary);
   const std::size_t balls = todo.shapes.clump ? todo.shapes.clump->balls.size() : 1;
   for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(frame_of(todo, k), balls);
   file.close();
-  if (!file) throw io::FileError(part.string(), "cannot be written: no room or no right to");
+  if (!file) throw io::FileError(draft.string(), "cannot be written: no room or no right to");
 }
 
-void write_vtkhdf(const Conversion& todo, const fs::path& part) {
-  io::VtkHdfWriter writer(part);
+void write_vtkhdf(const Conversion& todo, const fs::path& draft) {
+  io::VtkHdfWriter writer(draft);
   for (std::size_t k = 0; k < todo.frames; ++k) writer.append(frame_of(todo, k));
   writer.close();
 }
@@ -92,15 +103,12 @@ int convert_command(const ConvertOptions& options) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
-  const fs::path part = todo.out.string() + ".part";
+  const auto write = options.format == "lammps" ? write_lammps : write_vtkhdf;
   try {
-    (options.format == "lammps" ? write_lammps : write_vtkhdf)(todo, part);
-    fs::rename(part, todo.out);
+    io::write_by_draft(todo.out, [&](const fs::path& draft) { write(todo, draft); });
   } catch (const std::exception& error) {
-    std::error_code ignored;
-    fs::remove(part, ignored);
     print_error("talus: error: {}\n", error.what());
-    return exit_failure;
+    return dynamic_cast<const UnreadableInput*>(&error) ? exit_bad_input : exit_failure;
   }
   print_error("talus: {} written, {} frames\n", todo.out.string(), todo.frames);
   return exit_done;

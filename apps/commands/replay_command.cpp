@@ -136,7 +136,9 @@ int replay_command(ReplayOptions options) {
   }
   try {
     if (!options.smpi_platform.empty()) write_platform(options.smpi_platform, platform, machine);
-    if (!options.out.empty()) io::write_trace(options.out, played);
+    if (!options.out.empty())
+      io::write_by_draft(options.out,
+                         [&](const std::filesystem::path& draft) { io::write_trace(draft, played); });
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_failure;

@@ -78,7 +78,7 @@ class Viewed {
     const bool forces = view_.colour == force,
                speeds = view_.colour == speed || io::velocity_axis(view_.colour);
     return io::read_frame(results_, k,
-                          forces   ? io::FrameParts::all
+                          forces   ? io::FrameParts::forces
                           : speeds ? io::FrameParts::without_contacts
                                    : io::FrameParts::places);
   }

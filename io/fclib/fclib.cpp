@@ -157,20 +157,6 @@ void write_solution(hid_t file, const std::string& path, const FclibSolution& so
   });
 }
 
-/// Runs `write` on a draft of `out`, and moves the draft to its place when it is complete.
-template <class Write>
-void write_by_draft(const std::filesystem::path& out, Write&& write) {
-  const detail::Draft draft(out);
-  try {
-    const detail::QuietHdf5 quiet;
-    write(draft.path());
-    std::filesystem::rename(draft.path(), out);
-  } catch (const std::filesystem::filesystem_error& failure) {
-    throw FileError(out.string(), fmt::format("cannot be written: {}; check the folder's rights and room",
-                                              failure.code().message()));
-  }
-}
-
 }  // namespace
 
 FclibProblem read_fclib_problem(const std::filesystem::path& path) {
@@ -246,6 +232,7 @@ void write_fclib_solution(const std::filesystem::path& input, const std::filesys
                           const FclibSolution& solution) {
   check_output_files({input}, {out}, true);
   write_by_draft(out, [&](const std::filesystem::path& draft) {
+    const detail::QuietHdf5 quiet;
     std::filesystem::copy_file(input, draft, std::filesystem::copy_options::overwrite_existing);
     // Problems are often read-only, and a copy keeps that.
     std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
@@ -273,6 +260,7 @@ void write_fclib(const DelassusProblem& problem, const FclibSolution& solution, 
     mu.push_back(problem.diagonal[c].mu);
   }
   write_by_draft(out, [&](const std::filesystem::path& draft) {
+    const detail::QuietHdf5 quiet;
     const std::string name = draft.string();
     detail::Hdf5Object file = hold(H5Fcreate(name.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose,
                                    name, "making an HDF5 file");

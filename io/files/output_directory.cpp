@@ -194,6 +194,26 @@ void write_whole(const fs::path& path, const std::function<void(const WriteText&
   }
 }
 
+void write_by_draft(const fs::path& path, const std::function<void(const fs::path&)>& write) {
+  fs::path draft = path;
+  draft += "." + std::to_string(::getpid()) + std::string(unfinished_ending);
+  const auto discard = [&] {
+    std::error_code ignored;
+    fs::remove(draft, ignored);
+  };
+  try {
+    write(draft);
+    fs::rename(draft, path);
+  } catch (const fs::filesystem_error& failure) {
+    discard();
+    throw FileError(path.string(),
+                    "cannot be written: " + failure.code().message() + "; check the folder's rights and room");
+  } catch (...) {
+    discard();
+    throw;
+  }
+}
+
 void write_whole(const fs::path& path, std::string_view content) {
   write_whole(path, [&](const WriteText& out) { out(content); });
 }

@@ -51,7 +51,7 @@ void validate(const Frame& frame, FrameParts parts) {
   const std::size_t bodies = frame.id.size();
   demand_same_length(frame.x.size(), bodies, "x");
   demand_same_length(frame.radius.size(), bodies, "radius");
-  if (parts != FrameParts::grains || !frame.u.empty())
+  if ((parts != FrameParts::grains && parts != FrameParts::forces) || !frame.u.empty())
     demand_same_length(frame.u.size(), parts == FrameParts::places ? 0 : bodies, "u");
   if (!frame.omega.empty()) demand_same_length(frame.omega.size(), bodies, "omega");
   if (!frame.orientation.empty()) demand_same_length(frame.orientation.size(), bodies, "orientation");
@@ -235,6 +235,7 @@ void ResultsWriter::append_here(const Frame& part, const std::vector<FrameArray>
     write_attribute(frame, "step", part.step);
     write_attribute(frame, "time", part.time);
     write_attribute(frame, "stage", part.stage);
+    write_attribute(frame, "contacts", std::int64_t{part.with_contacts});
     begin = detail::lay_out(frame, arrays, format_.compression);
   });
   begin = ranks_.gather_records(std::span<const std::int64_t>(begin));

@@ -34,9 +34,9 @@
 
 namespace talus::io {
 
-/// What of a frame is read: contacts are most of it. `grains`: no contacts, and velocities where they are
-/// there; `places`: neither contacts nor velocities.
-enum class FrameParts { all, without_contacts, grains, places };
+/// What of a frame is read: contacts are most of it. `forces`: velocities where they are there; `grains`:
+/// likewise, and no contacts; `places`: neither contacts nor velocities.
+enum class FrameParts { all, without_contacts, forces, grains, places };
 
 /// Throws std::invalid_argument naming the array whose length does not fit the others; `omega`,
 /// `orientation` and `material` may be empty, and `u` where places are all that is asked for.

@@ -190,7 +190,7 @@ Frame load_frame(const std::string& name, std::size_t index, FrameParts parts) {
   }
   if (H5Lexists(h, "bodies/material", H5P_DEFAULT) > 0)
     frame.material = read_integers<std::int64_t>(h, name, "bodies/material");
-  if (parts == FrameParts::all) read_contacts({h, name}, frame);
+  if (parts == FrameParts::all || parts == FrameParts::forces) read_contacts({h, name}, frame);
 
   const auto names = read_names({file.id(), name}, "/walls/name");
   const auto position = read_doubles<double>(h, name, "walls/position");

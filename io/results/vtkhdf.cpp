@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "io/files/detail/hdf5_write.hpp"
@@ -150,7 +151,10 @@ VtkHdfWriter::VtkHdfWriter(const std::filesystem::path& path) {
   file_ = std::make_unique<File>(path);
 }
 
-VtkHdfWriter::~VtkHdfWriter() = default;
+VtkHdfWriter::~VtkHdfWriter() {
+  const detail::QuietHdf5 quiet;
+  file_.reset();
+}
 
 void VtkHdfWriter::append(const Frame& frame) {
   const detail::QuietHdf5 quiet;
@@ -210,7 +214,12 @@ void VtkHdfWriter::close() {
     for (const auto& [name, array] : f.arrays)
       detail::write_array({data.id(), f.path}, name.c_str(), "1", before);
   }
+  // While all of it is open, or what a full disk refuses would be known to destructors only.
+  demand(H5Fflush(f.file.id(), H5F_SCOPE_GLOBAL), f.path, "writing to disk");
+  const std::string path = f.path;
+  Hdf5Object file = std::move(f.file);
   file_.reset();
+  detail::close_file(file, path);
 }
 
 }  // namespace talus::io

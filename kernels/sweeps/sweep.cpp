@@ -50,6 +50,24 @@ void push(const Contacts& c, std::size_t k, const Space<double>& n, const Space<
   }
 }
 
+/// v_n + b of contact k [m/s], > 0 where it opens.
+double opening(const Contacts& c, std::size_t k, const Space<double>& n, std::span<const Velocity> velocity,
+               const WallCopy* wall) {
+  Space<double> v = space_of(velocity[static_cast<std::size_t>(c.first[k])].u);
+  v = v - space_of(wall ? wall->velocity : velocity[static_cast<std::size_t>(c.second[k])].u);
+  if (wall || c.drifts_between) v = v - space_of(drift_of(c, k).data());
+  return dot(v, n) + c.bias[k];
+}
+
+/// Whether contact k, which a sweep has opened, carried so little that it may end at once.
+bool faded(const Contacts& c, std::size_t k, const Space<double>& n, const Space<double>& before,
+           std::span<const Velocity> velocity, const WallCopy* wall) {
+  const double other = wall ? wall->inv_mass : velocity[static_cast<std::size_t>(c.second[k])].inv_mass;
+  const double W = velocity[static_cast<std::size_t>(c.first[k])].inv_mass + other;
+  const double most = damping_thresholds.faded * opening(c, k, n, velocity, wall);
+  return most > 0 && W * W * dot(before, before) <= most * most;
+}
+
 }  // namespace
 
 void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which) {
@@ -86,6 +104,7 @@ void relax(Contacts& contacts, ContactRange range, std::span<const double> befor
       r = contacts.rn[k] * n;
       r_before = before[k - range.begin] * n;
     }
+    if (dot(r, r) == 0 && faded(contacts, k, n, r_before, velocity, wall)) continue;
     const Space<double> r_new = r_before + (1.0 / m) * (r - r_before);
     push<Friction>(contacts, k, n, r_new - r, velocity, wall);
     if constexpr (Friction) {

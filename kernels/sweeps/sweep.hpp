@@ -69,6 +69,15 @@ void glue_vectors(std::size_t count, const At& vector) {
 /// The same of the velocities of the copies `which` of one wall.
 void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which);
 
+/// Every number that damping depends on. Ratios have no unit.
+struct DampingThresholds {
+  /// A contact that a sweep has opened ends at 0 where what it carried changes the velocity at the contact by
+  /// at most this part, in (0, 1), of the speed at which it opens: a part of it, and a part of that, would be
+  /// a force for hundreds of steps.
+  double faded = 1e-3;
+};
+inline constexpr DampingThresholds damping_thresholds;
+
 /// Keeps a part of what a sweep changed: r <- before + part (r - before), and V with it. `before` holds the
 /// impulses of the range (3 each, or 1 without friction). For a contact whose bodies stand in m_1 and m_2
 /// subdomains part = 1/max(m_1, m_2): the damping that makes block Jacobi on full masses (Schwarz, (24))

@@ -37,6 +37,22 @@ std::vector<NamedState> find_named(std::span<const NamedBody> named, const StepS
   return found;
 }
 
+/// What the flow of a cell has given a body in a step, whatever its contacts did [m/s]: its gain in mid-step,
+/// and where it was wrapped since `before`, the velocity of the image that goes on.
+Vec3 gained_by_flow(const NamedBodies::Motion& before, const NamedState& now, const StepState& state,
+                    const StepParameters& parameters) {
+  if (!state.domain.repeats) return Vec3::Zero();
+  const double half = 0.5 * parameters.time_step;
+  const Vec3 middle = Vec3(now.x) - half * Vec3(now.u);
+  const Vec3 wrapped = before.x + half * before.u - middle;
+  Vec3 gained = (1 + parameters.reflection) * state.flow.gain.at(middle);
+  // Anything less than a part of an edge is a correction of overlaps, not an image.
+  const Vec3 part = 0.25 * state.domain.edges();
+  if ((wrapped.cwiseAbs().array() > part.array() && part.array() > 0).any())
+    gained -= state.flow.before * wrapped;
+  return gained;
+}
+
 }  // namespace
 
 void NamedBodies::begin_step(std::span<const NamedBody> named, const StepState& state,
@@ -44,7 +60,7 @@ void NamedBodies::begin_step(std::span<const NamedBody> named, const StepState& 
   before_.clear();
   if (named.empty()) return;
   for (const NamedState& body : find_named(named, state, ranks))
-    before_.emplace_back(body.u[0], body.u[1], body.u[2]);
+    before_.push_back({Vec3(body.x), Vec3(body.u)});
 }
 
 std::vector<BodyReport> NamedBodies::end_step(std::span<const NamedBody> named, const StepState& state,
@@ -57,7 +73,8 @@ std::vector<BodyReport> NamedBodies::end_step(std::span<const NamedBody> named, 
     const NamedState& body = now[k];
     if (body.there == 0) continue;
     BodyReport report{named[k].name, Vec3(body.x), Vec3(body.u), Vec3(body.w) / body.radius};
-    report.force = body.mass * ((report.u - before_[k]) / parameters.time_step - parameters.gravity);
+    const Vec3 gained = report.u - before_[k].u - gained_by_flow(before_[k], body, state, parameters);
+    report.force = body.mass * (gained / parameters.time_step - parameters.gravity);
     reports.push_back(std::move(report));
   }
   return reports;

@@ -1,5 +1,8 @@
 """`talus convert` against readers of the two formats that share nothing with their writers."""
 
+import resource
+import shutil
+import signal
 import subprocess
 
 import h5py
@@ -203,6 +206,32 @@ def test_what_cannot_be_converted_is_refused_and_nothing_is_replaced(rain, tmp_p
         ended = convert(*words)
         assert ended.returncode == 2 and message in ended.stderr, ended.stderr
     assert (tmp_path / "mine").read_text() == "mine"
+
+
+@pytest.mark.parametrize("kind", ["lammps", "vtkhdf"])
+def test_a_file_that_has_no_room_is_an_error_and_leaves_the_earlier_one(rain, tmp_path, kind):
+    whole = tmp_path / f"grains.{kind}"
+    assert convert(rain.directory, "--to", kind, "-o", whole).returncode == 0
+    before = whole.read_bytes()
+    for share in (0.1, 0.5, 0.99):
+        words = [talus.find_program(), "convert", str(rain.directory), "--to", kind, "-o", str(whole), "--force"]
+        room = int(share * len(before))
+        ended = subprocess.run(words, capture_output=True, text=True,
+                               preexec_fn=lambda: (signal.signal(signal.SIGXFSZ, signal.SIG_IGN),
+                                                   resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))))
+        assert ended.returncode == 1 and "talus: error: " in ended.stderr, ended.stderr
+        assert "HDF5-DIAG" not in ended.stderr
+        assert whole.read_bytes() == before and list(tmp_path.iterdir()) == [whole]
+
+
+def test_damaged_results_are_bad_input(rain, tmp_path):
+    shutil.copytree(rain.directory, tmp_path / "run")
+    results = tmp_path / "run/results.h5"
+    results.write_bytes(results.read_bytes()[:3000])
+    for kind in ("lammps", "vtkhdf"):
+        ended = convert(tmp_path / "run", "--to", kind, "-o", tmp_path / "out")
+        assert ended.returncode == 2 and "results.h5" in ended.stderr, ended.stderr
+        assert list(tmp_path.iterdir()) == [tmp_path / "run"]
 
 
 def test_without_velocities_the_rest_is_converted(tmp_path):

@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+import subprocess
 import threading
 
 import h5py
@@ -158,6 +159,28 @@ def test_what_is_missing_is_said(heap_run):
         heap_run.frame(-1).rows(np.array([0, 98765, 98766]))
 
 
+def test_contacts_that_were_not_written_are_not_none(heap, tmp_path):
+    heap["output"] = {"every_steps": 10, "contacts_every": 2, "velocities": False}
+    run = talus.run(heap, tmp_path / "run", threads=1, progress=False)
+    assert len(run.frame(2).contacts) > 0
+    for ask in (lambda frame: frame.contacts, lambda frame: frame.normal_forces, lambda frame: frame.moments):
+        with pytest.raises(talus.MissingData, match="output.contacts_every leaves them out"):
+            ask(run.frame(1))
+    view = [talus.find_program(), "view", str(run.directory), "--frame", "2", "--colour", "force", "-o",
+            str(tmp_path / "force.png"), "--width", "64"]
+    assert subprocess.run(view).returncode == 0, "forces are seen without velocities"
+
+
+def test_a_frame_without_grains_has_empty_arrays(tmp_path):
+    scene = {"time_step": 1e-3, "orientation": True, "material": {"density": 2600},
+             "insert": [{"name": "late", "radius": 0.01, "from": 0.015, "count": 1,
+                         "region": {"shape": "box", "low": [0, 0, 0], "high": [0.1, 0.1, 0.1]}}],
+             "stage": [{"name": "wait", "end": {"steps": 20}}], "output": {"every_steps": 10}}
+    run = talus.run(scene, tmp_path / "run", threads=1, progress=False)
+    for frame, grains in ((run.frame(0), 0), (run.frame(-1), 1)):
+        assert frame.angular_velocities.shape == (grains, 3) and frame.orientations.shape == (grains, 4)
+
+
 @pytest.mark.parametrize("content", [b'{"summary": {"status": "do', b"", b"[1, 2]", b"\xff\xfe{}", b'{"summary": 3}'])
 def test_a_damaged_file_is_named(heap_run, tmp_path, content):
     other = tmp_path / "run"
@@ -185,6 +208,20 @@ def test_a_damaged_table_or_file_of_frames_is_named(heap_run, tmp_path, name, co
     (other / name).write_bytes(content)
     with pytest.raises(talus.DamagedFile, match=f"run/{name}: "):
         talus.open(other).frame(0).positions if name == "results.h5" else talus.open(other).missed
+
+
+def test_an_array_that_every_frame_has_is_missing_only_in_a_damaged_file(heap_run, tmp_path):
+    other = tmp_path / "run"
+    shutil.copytree(heap_run.directory, other)
+    with h5py.File(other / "results.h5", "r+") as file:
+        del file["frames/000001/contacts/force"]
+        file.attrs["format"] = np.bytes_(b"\xff\xfe")
+    with pytest.raises(talus.DamagedFile, match="run/results.h5: "):
+        talus.open(other).frame(1).positions
+    with h5py.File(other / "results.h5", "r+") as file:
+        file.attrs["format"] = "talus-results"
+    with pytest.raises(talus.DamagedFile, match="has no 'contacts/force'"):
+        talus.open(other).frame(1).forces
 
 
 def test_frames_are_read_while_h5py_has_the_file_open(heap_run):

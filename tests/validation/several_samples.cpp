@@ -113,6 +113,42 @@ TEST_F(SeveralSamples, TheForceOnARestingBodyIsItsWeight) {
   EXPECT_NEAR(path.number(39, "force_z"), weight, 1e-6 * weight);
 }
 
+/// A cell that begins to flow, or ceases to, carries a body along, and its image beyond a face moves
+/// otherwise: contacts do neither. With gravity, flow and crossings the momentum that is left is rounding.
+TEST_F(SeveralSamples, TheFlowOfACellIsNoForceOfContacts) {
+  const std::string scene = R"(time_step = 1e-3
+gravity = [0, 1, -9.81]
+[material]
+density = 2600
+[cell]
+lengths = [1.0, 1.2, 0.9]
+origin = [-3, 5, 7]
+[[sample]]
+kind = "body"
+name = "ball"
+radius = 0.1
+position = [-2.75, 5.5, 7.75]
+velocity = [20, -10, 5]
+[[stage]]
+strain_rates = [0.5, -0.5, 0.2]
+shear_rates = [0.3, 1.5, -0.4]
+end = { time = 0.1 }
+[[stage]]
+end = { time = 0.1 }
+)";
+  ASSERT_EQ(run(scene).code, 0);
+  const Table path = read_table(at("out/bodies.csv"));
+  ASSERT_EQ(path.rows.size(), 200u);
+  const double mass = 4.0 / 3 * M_PI * 1e-3 * 2600, momentum = mass * 23;
+  int jumps = 0;
+  for (std::size_t row = 0; row < path.rows.size(); ++row) {
+    for (const char* force : {"force_x", "force_y", "force_z"})
+      EXPECT_NEAR(path.number(row, force), 0, 1e-11 * momentum / 1e-3) << force << ", row " << row;
+    jumps += row > 0 && std::abs(path.number(row, "x") - path.number(row - 1, "x")) > 0.5;
+  }
+  EXPECT_GT(jumps, 1) << "it is to cross a face";
+}
+
 TEST_F(SeveralSamples, TheSameBitsOnAnyRanksOfThreeSubdomains) {
   ASSERT_EQ(run(ball_over_bed, "--out one --set decomposition.subdomains=3").code, 0);
   ASSERT_EQ(run(ball_over_bed, "--out two --threads 1 --set decomposition.subdomains=3").code, 0);

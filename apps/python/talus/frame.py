@@ -46,7 +46,7 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
             raise MissingData(f"{path}: no such file; the run has not come to its first frame") from None
         except (MissingData, PermissionError):
             raise
-        except (OSError, KeyError, RuntimeError) as error:
+        except (OSError, KeyError, RuntimeError, TypeError, UnicodeDecodeError) as error:
             if attempt + 1 == RETRIES and isinstance(error, NotThere):
                 raise MissingData(error.args[0]) from None
             if attempt + 1 == RETRIES:
@@ -83,13 +83,22 @@ class Frame:
             if group is None or int(group.attrs["step"]) != self.step:
                 raise NotThere(f"{self._path}: frame {self.index} of step {self.step} is no longer there: the run went on "
                                "from a checkpoint before it; ask the run for its frames again")
+            if name.startswith("contacts/") and not int(group.attrs.get("contacts", 1)):
+                raise MissingData(f"{self._path}: frame {self.index} was written without its contacts (the scene says "
+                                  "output.contacts = false, or output.contacts_every leaves them out of this frame)")
             if name not in group:
+                if name in _OF_EVERY_FRAME:
+                    raise KeyError(f"frame {self.index} has no '{name}', which every frame has")
                 hint = _WRITTEN_BY.get(name, "")
                 raise MissingData(f"{self._path}: frame {self.index} has no '{name}'{hint}")
             values: np.ndarray = group[name][()]
             return values
 
         return read_file(self._path, read)
+
+    def _of_grains(self, name: str, columns: tuple[int, ...], dtype: str = "f8") -> np.ndarray:
+        """An array that a frame without grains does not have, whatever the scene asks for."""
+        return self.array(name) if len(self.ids) else np.zeros((0, *columns), dtype)
 
     @cached_property
     def ids(self) -> np.ndarray:
@@ -114,17 +123,17 @@ class Frame:
     @cached_property
     def angular_velocities(self) -> np.ndarray:
         """Angular velocities [rad/s]; shape (n, 3)."""
-        return self.array("bodies/omega")
+        return self._of_grains("bodies/omega", (3,))
 
     @cached_property
     def orientations(self) -> np.ndarray:
         """Unit quaternions (w, x, y, z); shape (n, 4)."""
-        return self.array("bodies/orientation")
+        return self._of_grains("bodies/orientation", (4,))
 
     @cached_property
     def materials(self) -> np.ndarray:
         """Number of each grain's [[material]], from 0; shape (n,)."""
-        return self.array("bodies/material")
+        return self._of_grains("bodies/material", (), "i8")
 
     @cached_property
     def contacts(self) -> np.ndarray:
@@ -223,6 +232,8 @@ class Frame:
         return rows
 
 
+_OF_EVERY_FRAME = {"bodies/id", "bodies/x", "bodies/radius", "contacts/bodies", "contacts/force", "walls/position",
+                   "walls/velocity", "walls/force"}
 _WRITTEN_BY = {
     "bodies/u": " (the scene says output.velocities = false)",
     "bodies/omega": " (the scene says rotation = false, or output.velocities = false)",

@@ -1,12 +1,10 @@
 #include "io/fclib/detail/fclib_file.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <system_error>
 #include <utility>
 
 #include "io/files/detail/hdf5_read.hpp"
@@ -214,14 +212,6 @@ void write_matrix(hid_t place, const std::string& path, const DelassusProblem& p
   write_values(place, path, "p", begin);
   write_values(place, path, "i", column);
   write_values(place, path, "x", value);
-}
-
-Draft::Draft(const std::filesystem::path& out)
-    : path_(std::filesystem::path(out).concat(fmt::format(".{}{}", ::getpid(), unfinished_ending))) {}
-
-Draft::~Draft() {
-  std::error_code ignored;
-  std::filesystem::remove(path_, ignored);
 }
 
 }  // namespace talus::io::detail

@@ -49,18 +49,4 @@ void write_text(hid_t place, const std::string& path, const char* name, const st
 /// W as compressed rows with complete blocks, as Siconos writes it.
 void write_matrix(hid_t place, const std::string& path, const DelassusProblem& problem);
 
-/// A file that is deleted unless it has been moved to its place.
-class Draft {
- public:
-  /// Beside `out`; the process id keeps two runs with the same output from writing into each other's draft.
-  explicit Draft(const std::filesystem::path& out);
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-  ~Draft();
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 }  // namespace talus::io::detail
