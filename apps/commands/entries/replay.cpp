@@ -44,7 +44,8 @@ void add_options(CLI::App& app, ReplayOptions& options) {
       ->capture_default_str();
   app.add_option("--line", options.machine.line, "to hand a cache line to another core [s]")
       ->capture_default_str();
-  app.add_option("--noise", options.machine.noise, "each task, but not checks and what ranks do alone, takes up to this part longer")
+  app.add_option("--noise", options.machine.noise,
+                 "each task, but not checks and what ranks do alone, takes up to this part longer")
       ->capture_default_str();
   app.add_option("--seed", options.machine.seed, "of the noise")
       ->capture_default_str()
