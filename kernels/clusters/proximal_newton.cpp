@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -75,34 +76,25 @@ class ProximalSteps {
   /// r.offset is least, until a contact opens, or one has changed by the largest. In directions that W hardly
   /// resists single steps, even firm ones, creep. Returns how many times the last change that is.
   double leap(double& work) {
-    if (leaps_ >= thresholds_.most_leaps) return 0;
-    // The last step to the end: what its momentum is off by would show in the impulses.
-    const std::vector<Vec3> to = std::exchange(step_.centre, before_);
-    const std::vector<Twist> motion = step_.motion;
-    const Minimised end =
-        minimise({0, std::numeric_limits<double>::infinity()}, thresholds_.newton, step_, work);
-    if (!(end.off <= minimum_.off)) {
-      step_.centre = to;
-      step_.motion = motion;
-      return 0;
-    }
-    std::vector<Vec3> carried;
-    for (std::size_t k = 0; k < before_.size(); ++k) carried.push_back(step_.carried(k, step_.motion));
-    step_.centre = std::move(carried);
-    balanced_ = true;
-    // From a motion that does not belong to its centres no direction can be told.
-    if (!began_balanced_) return 0;
-    const std::vector<Twist> by = added(step_.motion, -1, began_);
-    const double part = length_of_leap(by);
-    if (part >= 1) ++leaps_;
-    step_.motion = added(step_.motion, part, by);
-    for (std::size_t k = 0; k < step_.centre.size(); ++k) {
-      const ContactEquation& c = problem_.contacts[k];
-      step_.centre[k] =
-          project_on_cone(step_.centre[k] + part * (step_.centre[k] - before_[k]), c.normal, c.mu);
-    }
-    return part;
+    if (leaps_ >= thresholds_.most_leaps || !balance(work)) return 0;
+    const Creep creep = last_change();
+    // Forces without bound are none: walls press on what cannot get away.
+    const bool bounded = creep.largest <= thresholds_.most_growth * first_largest_;
+    const double length = bounded ? std::min(creep.length(), creep.largest / creep.change) : 0;
+    if (length >= 1) ++leaps_;
+    go_on(length);
+    return length;
   }
+
+  /// The same however large the impulses become: whether bodies move where the creep ends. Infinite where it
+  /// does not end; nothing where another step has to come first.
+  std::optional<double> follow(double& work) {
+    if (!balance(work)) return {};
+    const double length = last_change().length();
+    if (std::isfinite(length)) go_on(length);
+    return length;
+  }
+
   /// Of the impulses since those of the problem.
   std::vector<Vec3> changes() const {
     std::vector<Vec3> change;
@@ -114,24 +106,59 @@ class ProximalSteps {
   bool firmer(bool) const { return minimum_.factorisations <= thresholds_.easy; }
 
  private:
-  /// Over the last change, which has moved the bodies `by`.
-  double length_of_leap(const std::vector<Twist>& by) const {
-    double slope = 0, largest = 0, change = 0, opens = std::numeric_limits<double>::infinity();
+  /// How the last step has changed the impulses, and how far that may go on, in such changes.
+  struct Creep {
+    double slope = 0;                                        ///< of the dual objective along it [J]
+    double least = std::numeric_limits<double>::infinity();  ///< where that is least
+    double opens = std::numeric_limits<double>::infinity();  ///< where the first contact opens
+    double largest = 0, change = 0;                          ///< impulse and change of one [N s]
+    double length() const { return slope < 0 && change > 0 ? std::min(least, opens) : 0; }
+  };
+
+  /// The last step to its end: what its momentum is off by would show in the impulses. False where that is
+  /// not so, or the step began with a motion that does not belong to its centres: no direction can be told.
+  bool balance(double& work) {
+    const std::vector<Vec3> to = std::exchange(step_.centre, before_);
+    const std::vector<Twist> motion = step_.motion;
+    const Minimised end =
+        minimise({0, std::numeric_limits<double>::infinity()}, thresholds_.newton, step_, work);
+    if (!(end.off <= minimum_.off)) {
+      step_.centre = to;
+      step_.motion = motion;
+      return false;
+    }
+    std::vector<Vec3> carried;
+    for (std::size_t k = 0; k < before_.size(); ++k) carried.push_back(step_.carried(k, step_.motion));
+    step_.centre = std::move(carried);
+    balanced_ = true;
+    return began_balanced_;
+  }
+
+  Creep last_change() const {
+    Creep creep;
     for (std::size_t k = 0; k < step_.centre.size(); ++k) {
       const ContactEquation& c = problem_.contacts[k];
       const Vec3 last = step_.centre[k] - before_[k];
-      slope += step_.velocity(k, step_.motion).dot(last);
-      largest = larger(largest, step_.centre[k].norm());
-      change = larger(change, last.norm());
+      creep.slope += step_.velocity(k, step_.motion).dot(last);
+      creep.largest = larger(creep.largest, step_.centre[k].norm());
+      creep.change = larger(creep.change, last.norm());
       const double closing = -c.normal.dot(last);
       if (closing > 0 && step_.centre[k] != Vec3::Zero())
-        opens = std::min(opens, c.normal.dot(step_.centre[k]) / closing);
+        creep.opens = std::min(creep.opens, c.normal.dot(step_.centre[k]) / closing);
     }
-    const double norm = kinetic_norm(problem_, by);
-    const double least = norm > 0 ? -slope / (norm * norm) : std::numeric_limits<double>::infinity();
-    // Forces without bound are none: walls press on what cannot get away.
-    const bool bounded = largest <= thresholds_.most_growth * first_largest_;
-    return bounded && slope < 0 && change > 0 ? std::min({least, opens, largest / change}) : 0;
+    const double norm = kinetic_norm(problem_, added(step_.motion, -1, began_));
+    if (norm > 0) creep.least = -creep.slope / (norm * norm);
+    return creep;
+  }
+
+  /// So many times the last change more.
+  void go_on(double length) {
+    step_.motion = added(step_.motion, length, added(step_.motion, -1, began_));
+    for (std::size_t k = 0; k < step_.centre.size(); ++k) {
+      const ContactEquation& c = problem_.contacts[k];
+      step_.centre[k] =
+          project_on_cone(step_.centre[k] + length * (step_.centre[k] - before_[k]), c.normal, c.mu);
+    }
   }
 
   const BodyProblem& problem_;

@@ -4,6 +4,7 @@
 /// (coulomb_newton.hpp) and the convex ones (proximal_newton.hpp) have in common.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -37,6 +38,9 @@ struct SearchThresholds {
   int idle = 20;
   /// As it is: more than this part of it, in (0, 1), is left behind all of them.
   double shrinks = 0.9;
+  /// Velocities that have settled while impulses creep on have to stay where so many, >= 1, of these ways
+  /// end.
+  int follows = 4;
 };
 
 /// Where a step begins, and what is asked of it.
@@ -60,6 +64,7 @@ struct StepStart {
 ///
 ///   bool at_rest() const                   what changes the impulses yet is rounding
 ///   double leap(double& work)              goes on as the last step has changed the impulses, so many times
+///   std::optional<double> follow(double&)  likewise, however far, where velocities have settled
 ///   std::vector<Vec3> changes() const      the impulses then, since those of the problem
 ///
 /// and for problems with friction
@@ -78,7 +83,7 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
   const bool friction = has_friction(problem);
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
   std::vector<Vec3> impulse = best.impulse;
-  int wary = 0, idle = 0;
+  int wary = 0, idle = 0, followed = 0;
   double open = std::numeric_limits<double>::infinity();  // before the idle steps
   for (int k = 1; k <= search.most_steps && work > 0 && !best.settled && idle < search.idle; ++k) {
     const std::vector<Twist> before = steps.motion();
@@ -100,8 +105,9 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     // In directions that W hardly resists impulses creep the further the firmer a step is; where they need
     // not be known only the firmest steps tell that velocities do not creep as well.
     bool known = friction || now.pushed * thresholds.firmness <= thresholds.same_forces * firmness;
-    if (!asked.forces) known = known || firmness >= thresholds.firmness;
     if constexpr (requires { steps.at_rest(); }) known = known || steps.at_rest();
+    const bool creeps = !known;
+    if (!asked.forces) known = known || firmness >= thresholds.firmness;
     now.settled = comparable && known && firmness >= search.firm_enough && now.missed <= search.rest * goal;
     if (friction && !now.settled)
       if (const double rest = larger(now.moved, beyond_rounding(problem, now, asked.enough, thresholds));
@@ -118,6 +124,17 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     impulse = now.impulse;
     moved = now.moved;
     last = firmness;
+    // A creep that moves nobody may open a contact, and then it does.
+    if constexpr (requires { steps.follow(work); })
+      if (now.settled && creeps && followed < search.follows) {
+        now.settled = false;
+        if (const std::optional<double> length = steps.follow(work)) {
+          if (!std::isfinite(*length)) break;
+          followed = *length > 0 ? followed + 1 : search.follows;
+          if (*length > 0) last = std::numeric_limits<double>::infinity();
+        }
+        impulse = steps.changes();
+      }
     if constexpr (requires { steps.leap(work); })
       if (small && !known && firmness >= search.firm_enough) {
         // What follows a leap tells nothing of what is still to come.
