@@ -114,7 +114,8 @@ std::string man_page(std::span<const Command> table) {
       "written\n.TP\n.B 3\n"
       "done, but a step or problem missed its tolerance\n.TP\n.B 75\nstopped, and \\-\\-resume goes on from "
       "there\n"
-      ".SH SEE ALSO\ndocs/tutorial.md, docs/scenes.md and docs/formats.md of the sources\n";
+      ".SH SEE ALSO\ndocs/tutorial.md, docs/scenes.md and docs/formats.md of the sources, "
+      "in /usr/share/doc/talus of the package\n";
   return page;
 }
 

@@ -16,7 +16,7 @@ install(FILES ${PROJECT_BINARY_DIR}/talus.man DESTINATION ${CMAKE_INSTALL_MANDIR
 install(FILES ${PROJECT_BINARY_DIR}/talus.completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
         RENAME talus COMPONENT program)
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/talus COMPONENT program)
-install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/talus COMPONENT program PATTERN history EXCLUDE)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/talus COMPONENT program)
 install(PROGRAMS apps/packages/smoke.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/talus COMPONENT program)
 install(DIRECTORY apps/python/talus DESTINATION lib/python3/dist-packages COMPONENT python PATTERN __pycache__ EXCLUDE)
 

@@ -195,14 +195,35 @@ struct Overlaps {
   double worst = 0.1;  ///< depth over the smaller radius; less is none
   std::string between;
 
-  void add(double depth, double radius, const auto& describe) {
-    if (depth <= 0.1 * radius) return;
+  void add(double depth, const auto& describe) {
+    if (depth <= 0.1) return;
     ++count;
-    if (depth <= worst * radius) return;
-    worst = depth / radius;
+    if (depth <= worst) return;
+    worst = depth;
     between = describe();
   }
 };
+
+/// visit(place from the centre [m], radius [m]) for each ball of grain k; a sphere is one.
+void each_ball(const io::Scene& scene, const Sample& sample, std::size_t k, const auto& visit) {
+  const double radius = sample.radius[k];
+  if (sample.shape.number == 0) return visit(Vec3(Vec3::Zero()), radius);
+  const Mat3 turned = rotation_of(draw_orientation(sample.seed, static_cast<std::uint64_t>(sample.id_of(k))));
+  for (const Ball& ball : scene.setup.clumps[sample.shape.number - std::size_t{1}].balls)
+    visit(Vec3(radius * (turned * ball.centre)), radius * ball.radius);
+}
+
+/// The deepest, over the smaller radius, of balls of grains a and b.
+double overlap_of(const io::Scene& scene, const Sample& sample, std::size_t a, std::size_t b) {
+  const Vec3 apart = scene.setup.domain.separation(sample.x[a], sample.x[b]);
+  double deepest = 0;
+  each_ball(scene, sample, a, [&](const Vec3& x, double r) {
+    each_ball(scene, sample, b, [&](const Vec3& y, double s) {
+      deepest = std::max(deepest, (r + s - (apart + x - y).norm()) / std::min(r, s));
+    });
+  });
+  return deepest;
+}
 
 }  // namespace
 
@@ -254,16 +275,18 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   if (std::ranges::any_of(scene.samples, &io::SampleSpec::from_file)) {
     for (const GrainPair& pair : near_pairs(scene.setup.domain, sample.x, sample.radius)) {
       const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
-      overlaps.add(sample.radius[a] + sample.radius[b] -
-                       scene.setup.domain.separation(sample.x[a], sample.x[b]).norm(),
-                   std::min(sample.radius[a], sample.radius[b]),
+      overlaps.add(overlap_of(scene, sample, a, b),
                    [&] { return fmt::format("grains {} and {}", id(a), id(b)); });
     }
   }
   for (const Wall& wall : scene.setup.walls)
-    for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < sample.size(); ++k)
-      overlaps.add(depth_at(wall, sample.x[k], sample.radius[k]), sample.radius[k],
-                   [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
+    for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < sample.size(); ++k) {
+      double deepest = 0;
+      each_ball(scene, sample, k, [&](const Vec3& x, double r) {
+        deepest = std::max(deepest, depth_at(wall, sample.x[k] + x, r) / r);
+      });
+      overlaps.add(deepest, [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
+    }
   if (overlaps.count == 0) return "";
   return fmt::format(
       "{} overlap{} of more than 10 % of the smaller radius, the deepest of {:.0f} % between {}; {}",
