@@ -69,7 +69,7 @@ struct UnreadableInput : std::runtime_error {
 
 Frame read(const Conversion& todo, std::size_t k) try {
   return io::read_frame(todo.results, k, io::FrameParts::grains);
-} catch (const std::exception& error) {
+} catch (const io::FileError& error) {
   throw UnreadableInput(error.what());
 }
 

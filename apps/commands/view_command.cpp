@@ -82,6 +82,15 @@ class Viewed {
                           : speeds ? io::FrameParts::without_contacts
                                    : io::FrameParts::places);
   }
+  /// Throws std::invalid_argument where frame k was written without what its colours are made of. In a film
+  /// such frames are grey.
+  void demand_colours(std::size_t k) const {
+    if (view_.colour == io::GrainColour::force && !frame(k).with_contacts)
+      throw std::invalid_argument(
+          fmt::format("{}: frame {} was written without its contacts, for the scene says output.contacts = "
+                      "false, or output.contacts_every leaves them out; choose another --colour or --frame",
+                      results_.string(), k));
+  }
 
   /// One scale and one place for all frames. A frame at rest, or without forces, has no scale of its own.
   void fit() {
@@ -184,6 +193,7 @@ int view_command(const ViewCommandOptions& options) {
       throw std::invalid_argument(fmt::format("--frame is {}, there are {} frames", options.frame, frames));
     io::check_output_files(sources_in(options.run), {out}, options.force);
     const auto which = static_cast<std::size_t>(k);
+    viewed.demand_colours(which);
     image = out.extension() == ".svg" ? viewed.picture(which) : viewed.image(which);
   } catch (const std::exception& error) {
     return refuse(error, exit_bad_input);

@@ -19,6 +19,7 @@
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/scatter.hpp"
+#include "kernels/shapes/clump.hpp"
 
 namespace talus {
 
@@ -281,6 +282,7 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   }
   for (const Wall& wall : scene.setup.walls)
     for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < sample.size(); ++k) {
+      if (depth_at(wall, sample.x[k], sample.radius[k]) <= 0) continue;
       double deepest = 0;
       each_ball(scene, sample, k, [&](const Vec3& x, double r) {
         deepest = std::max(deepest, depth_at(wall, sample.x[k] + x, r) / r);

@@ -53,7 +53,7 @@ Truth velocities(Exact exact) {
       error = std::max(error, largest(difference(is, should)));
       scale = std::max({scale, largest(difference(should, unchanged(step, k))), rounding * fastest});
     }
-    return scale > 0 ? std::max(0.0, error - last_digit * ever) / scale : 0;
+    return scale > 0 ? std::max(error - last_digit * ever, 0.0) / scale : 0;
   }};
 }
 

@@ -171,47 +171,51 @@ void check_output_files(const std::vector<fs::path>& inputs, const std::vector<f
   }
 }
 
-void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
-  fs::path temporary = path;
-  temporary += unfinished_ending;
-  const auto discard = [&] {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-  };
-  try {
-    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    content([&](std::string_view text) { file.write(text); });
-    file.close();
-  } catch (...) {
-    discard();
-    throw;
-  }
-  std::error_code error;
-  fs::rename(temporary, path, error);
-  if (error) {
-    discard();
-    throw FileError(path.string(), "cannot be replaced: " + error.message());
-  }
-}
+namespace {
 
-void write_by_draft(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  fs::path draft = path;
-  draft += "." + std::to_string(::getpid()) + std::string(unfinished_ending);
+/// What `write` makes under the name `draft` takes the place of `path`. What it throws goes on.
+template <class Write>
+void replace_by(const fs::path& draft, const fs::path& path, const Write& write) {
   const auto discard = [&] {
     std::error_code ignored;
     fs::remove(draft, ignored);
   };
   try {
-    write(draft);
-    fs::rename(draft, path);
-  } catch (const fs::filesystem_error& failure) {
-    discard();
-    throw FileError(path.string(),
-                    "cannot be written: " + failure.code().message() + "; check the folder's rights and room");
+    write();
   } catch (...) {
     discard();
     throw;
   }
+  std::error_code error;
+  fs::rename(draft, path, error);
+  if (!error) return;
+  discard();
+  throw FileError(path.string(), "cannot be replaced: " + error.message());
+}
+
+}  // namespace
+
+void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
+  fs::path draft = path;
+  draft += unfinished_ending;
+  replace_by(draft, path, [&] {
+    detail::Descriptor file(draft, O_WRONLY | O_CREAT | O_TRUNC);
+    content([&](std::string_view text) { file.write(text); });
+    file.close();
+  });
+}
+
+void write_by_draft(const fs::path& path, const std::function<void(const fs::path&)>& write) {
+  fs::path draft = path;
+  draft += "." + std::to_string(::getpid()) + std::string(unfinished_ending);
+  replace_by(draft, path, [&] {
+    try {
+      write(draft);
+    } catch (const fs::filesystem_error& failure) {
+      throw FileError(path.string(), "cannot be written: " + failure.code().message() +
+                                         "; check the folder's rights and room");
+    }
+  });
 }
 
 void write_whole(const fs::path& path, std::string_view content) {

@@ -4,7 +4,7 @@
 ///
 ///   /walls/name                  names, in the order of the setup; material [w] where materials have names
 ///   /materials/name              names, by number, where they have some
-///   /frames/000000               attributes step, time, stage
+///   /frames/000000               attributes step, time, stage; contacts: 0 where they are left out
 ///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3]; where computed omega [n,3] and
 ///                                orientation [n,4]; where materials have names, material [n]
 ///   /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force [m,3]

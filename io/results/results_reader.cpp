@@ -174,6 +174,9 @@ Frame load_frame(const std::string& name, std::size_t index, FrameParts parts) {
   read_attribute({group.id(), name}, "step", H5T_NATIVE_INT64, &frame.step);
   read_attribute({group.id(), name}, "time", H5T_NATIVE_DOUBLE, &frame.time);
   frame.stage = detail::read_text({group.id(), name}, "stage");
+  // Files of earlier versions do not tell.
+  frame.with_contacts =
+      H5Aexists(group.id(), "contacts") <= 0 || detail::read_integer({group.id(), name}, "contacts") != 0;
 
   const hid_t h = group.id();
   frame.id = read_integers<std::int64_t>(h, name, "bodies/id");

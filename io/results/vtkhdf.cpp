@@ -200,19 +200,21 @@ void VtkHdfWriter::close() {
     detail::write_array(group, "Offsets", "1", zeros);
     detail::write_array(group, "Connectivity", "1", std::vector<std::int64_t>());
   }
-  const Hdf5Object group = create_group(root, "Steps");
-  const Place table{group.id(), f.path};
-  detail::write_attribute(table, "NSteps", static_cast<std::int64_t>(steps));
-  detail::write_array(table, "Values", "s", f.times);
-  detail::write_array(table, "PartOffsets", "1", part);
-  detail::write_array(table, "NumberOfParts", "1", ones);
-  detail::write_array(table, "PointOffsets", "1", before);
-  detail::write_array(table, "CellOffsets", "1", of_cells);
-  detail::write_array(table, "ConnectivityIdOffsets", "1", of_cells);
   {
-    const Hdf5Object data = create_group(table, "PointDataOffsets");
-    for (const auto& [name, array] : f.arrays)
-      detail::write_array({data.id(), f.path}, name.c_str(), "1", before);
+    const Hdf5Object group = create_group(root, "Steps");
+    const Place table{group.id(), f.path};
+    detail::write_attribute(table, "NSteps", static_cast<std::int64_t>(steps));
+    detail::write_array(table, "Values", "s", f.times);
+    detail::write_array(table, "PartOffsets", "1", part);
+    detail::write_array(table, "NumberOfParts", "1", ones);
+    detail::write_array(table, "PointOffsets", "1", before);
+    detail::write_array(table, "CellOffsets", "1", of_cells);
+    detail::write_array(table, "ConnectivityIdOffsets", "1", of_cells);
+    {
+      const Hdf5Object data = create_group(table, "PointDataOffsets");
+      for (const auto& [name, array] : f.arrays)
+        detail::write_array({data.id(), f.path}, name.c_str(), "1", before);
+    }
   }
   // While all of it is open, or what a full disk refuses would be known to destructors only.
   demand(H5Fflush(f.file.id(), H5F_SCOPE_GLOBAL), f.path, "writing to disk");

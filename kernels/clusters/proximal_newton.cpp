@@ -86,8 +86,8 @@ class ProximalSteps {
     return length;
   }
 
-  /// The same however large the impulses become: whether bodies move where the creep ends. Infinite where it
-  /// does not end; nothing where another step has to come first.
+  /// The same however large the impulses become: whether bodies move where the creep ends. 0 where there is
+  /// none, not finite where it does not end; nothing where another step has to come first.
   std::optional<double> follow(double& work) {
     if (!balance(work)) return {};
     const double length = last_change().length();

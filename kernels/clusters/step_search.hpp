@@ -38,9 +38,10 @@ struct SearchThresholds {
   int idle = 20;
   /// As it is: more than this part of it, in (0, 1), is left behind all of them.
   double shrinks = 0.9;
-  /// Velocities that have settled while impulses creep on have to stay where so many, >= 1, of these ways
-  /// end.
-  int follows = 4;
+  /// Velocities that have settled while impulses creep on have to stay where the creep ends, so many times
+  /// one after another, >= 1; and after so many steps, >= 1, that do not tell where that is they are not
+  /// known.
+  int follows = 4, vain = 8;
 };
 
 /// Where a step begins, and what is asked of it.
@@ -83,7 +84,7 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
   const bool friction = has_friction(problem);
   double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
   std::vector<Vec3> impulse = best.impulse;
-  int wary = 0, idle = 0, followed = 0;
+  int wary = 0, idle = 0, followed = 0, vain = 0;
   double open = std::numeric_limits<double>::infinity();  // before the idle steps
   for (int k = 1; k <= search.most_steps && work > 0 && !best.settled && idle < search.idle; ++k) {
     const std::vector<Twist> before = steps.motion();
@@ -128,10 +129,13 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     if constexpr (requires { steps.follow(work); })
       if (now.settled && creeps && followed < search.follows) {
         now.settled = false;
-        if (const std::optional<double> length = steps.follow(work)) {
-          if (!std::isfinite(*length)) break;
-          followed = *length > 0 ? followed + 1 : search.follows;
-          if (*length > 0) last = std::numeric_limits<double>::infinity();
+        const std::optional<double> length = steps.follow(work);
+        // Without an end, or not known: nothing is, and what has been found before is no better.
+        if (length ? !std::isfinite(*length) : ++vain > search.vain) break;
+        if (length && *length == 0) followed = search.follows;  // nothing creeps
+        if (length && *length > 0) {
+          ++followed;
+          last = std::numeric_limits<double>::infinity();
         }
         impulse = steps.changes();
       }

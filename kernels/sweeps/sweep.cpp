@@ -50,7 +50,7 @@ void push(const Contacts& c, std::size_t k, const Space<double>& n, const Space<
   }
 }
 
-/// v_n + b of contact k [m/s], > 0 where it opens.
+/// v_n + b of contact k of spheres, as all damped ones are [m/s]; > 0 where it opens.
 double opening(const Contacts& c, std::size_t k, const Space<double>& n, std::span<const Velocity> velocity,
                const WallCopy* wall) {
   Space<double> v = space_of(velocity[static_cast<std::size_t>(c.first[k])].u);
@@ -104,7 +104,7 @@ void relax(Contacts& contacts, ContactRange range, std::span<const double> befor
       r = contacts.rn[k] * n;
       r_before = before[k - range.begin] * n;
     }
-    if (dot(r, r) == 0 && faded(contacts, k, n, r_before, velocity, wall)) continue;
+    if (r.x == 0 && r.y == 0 && r.z == 0 && faded(contacts, k, n, r_before, velocity, wall)) continue;
     const Space<double> r_new = r_before + (1.0 / m) * (r - r_before);
     push<Friction>(contacts, k, n, r_new - r, velocity, wall);
     if constexpr (Friction) {

@@ -71,9 +71,9 @@ void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which
 
 /// Every number that damping depends on. Ratios have no unit.
 struct DampingThresholds {
-  /// A contact that a sweep has opened ends at 0 where what it carried changes the velocity at the contact by
-  /// at most this part, in (0, 1), of the speed at which it opens: a part of it, and a part of that, would be
-  /// a force for hundreds of steps.
+  /// A contact that a sweep has opened ends at 0 where W_nn |r| of what it carried is at most this part, in
+  /// (0, 1), of the speed at which it opens: a part of it, and a part of that, would be a force for hundreds
+  /// of steps.
   double faded = 1e-3;
 };
 inline constexpr DampingThresholds damping_thresholds;

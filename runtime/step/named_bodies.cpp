@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "kernels/bodies/bodies.hpp"
+#include "kernels/detection/separation.hpp"
+#include "runtime/step/cell_flow.hpp"
 
 namespace talus {
 
@@ -37,20 +39,25 @@ std::vector<NamedState> find_named(std::span<const NamedBody> named, const StepS
   return found;
 }
 
+/// The sum of whole edges of a cell, columns of `edges`, that is next to d [m].
+Vec3 next_edges(const Mat3& edges, const Vec3& d) {
+  Vec3 left = d;
+  for (const Eigen::Index axis : {2, 1, 0})
+    if (edges(axis, axis) > 0) left -= nearest_integer(left[axis] / edges(axis, axis)) * edges.col(axis);
+  return d - left;
+}
+
 /// What the flow of a cell has given a body in a step, whatever its contacts did [m/s]: its gain in mid-step,
 /// and where it was wrapped since `before`, the velocity of the image that goes on.
 Vec3 gained_by_flow(const NamedBodies::Motion& before, const NamedState& now, const StepState& state,
                     const StepParameters& parameters) {
   if (!state.domain.repeats) return Vec3::Zero();
   const double half = 0.5 * parameters.time_step;
-  const Vec3 middle = Vec3(now.x) - half * Vec3(now.u);
-  const Vec3 wrapped = before.x + half * before.u - middle;
-  Vec3 gained = (1 + parameters.reflection) * state.flow.gain.at(middle);
-  // Anything less than a part of an edge is a correction of overlaps, not an image.
-  const Vec3 part = 0.25 * state.domain.edges();
-  if ((wrapped.cwiseAbs().array() > part.array() && part.array() > 0).any())
-    gained -= state.flow.before * wrapped;
-  return gained;
+  const Mat3 edges = edges_of(state.domain) - half * matrix_of(state.domain.rates);
+  const Vec3 unwrapped = before.x + half * before.u;
+  // A correction of overlaps, which has moved the body since, is less than an edge.
+  const Vec3 wrapped = next_edges(edges, unwrapped - (Vec3(now.x) - half * Vec3(now.u)));
+  return (1 + parameters.reflection) * state.flow.gain.at(unwrapped - wrapped) - state.flow.before * wrapped;
 }
 
 }  // namespace

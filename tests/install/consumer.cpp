@@ -1,5 +1,3 @@
-#include <mpi.h>  // of whom a user may want more than Talus does
-
 #include <cstdio>
 
 #include "kernels/bodies/bodies.hpp"

@@ -226,12 +226,13 @@ def test_a_file_that_has_no_room_is_an_error_and_leaves_the_earlier_one(rain, tm
 
 def test_damaged_results_are_bad_input(rain, tmp_path):
     shutil.copytree(rain.directory, tmp_path / "run")
-    results = tmp_path / "run/results.h5"
-    results.write_bytes(results.read_bytes()[:3000])
+    with h5py.File(tmp_path / "run/results.h5", "r+") as file:
+        del file["frames/000002/bodies/x"]
+    (tmp_path / "out").write_text("mine")
     for kind in ("lammps", "vtkhdf"):
-        ended = convert(tmp_path / "run", "--to", kind, "-o", tmp_path / "out")
+        ended = convert(tmp_path / "run", "--to", kind, "-o", tmp_path / "out", "--force")
         assert ended.returncode == 2 and "results.h5" in ended.stderr, ended.stderr
-        assert list(tmp_path.iterdir()) == [tmp_path / "run"]
+        assert (tmp_path / "out").read_text() == "mine" and len(list(tmp_path.iterdir())) == 2
 
 
 def test_without_velocities_the_rest_is_converted(tmp_path):

@@ -169,6 +169,11 @@ def test_contacts_that_were_not_written_are_not_none(heap, tmp_path):
     view = [talus.find_program(), "view", str(run.directory), "--frame", "2", "--colour", "force", "-o",
             str(tmp_path / "force.png"), "--width", "64"]
     assert subprocess.run(view).returncode == 0, "forces are seen without velocities"
+    view[4] = "1"
+    refused = subprocess.run([*view, "--force"], capture_output=True, text=True)
+    assert refused.returncode == 2 and "without its contacts" in refused.stderr
+    with pytest.raises(talus.MissingData, match="'walls' is no array"):
+        run.frame(1).array("walls")
 
 
 def test_a_frame_without_grains_has_empty_arrays(tmp_path):

@@ -131,7 +131,7 @@ position = [-2.75, 5.5, 7.75]
 velocity = [20, -10, 5]
 [[stage]]
 strain_rates = [0.5, -0.5, 0.2]
-shear_rates = [0.3, 1.5, -0.4]
+shear_rates = [0.3, 9.0, -0.4]
 end = { time = 0.1 }
 [[stage]]
 end = { time = 0.1 }

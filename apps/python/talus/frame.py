@@ -91,6 +91,8 @@ class Frame:
                     raise KeyError(f"frame {self.index} has no '{name}', which every frame has")
                 hint = _WRITTEN_BY.get(name, "")
                 raise MissingData(f"{self._path}: frame {self.index} has no '{name}'{hint}")
+            if not isinstance(group[name], h5py.Dataset):
+                raise MissingData(f"{self._path}: '{name}' is no array but a group of arrays: {', '.join(group[name])}")
             values: np.ndarray = group[name][()]
             return values
 
