@@ -284,9 +284,9 @@ TEST(CertificateAudit, OfALatticeThatWallsPressByFarMoreThanMovesItIsNotDeceived
 }
 
 TEST(CertificateAudit, OfARowThatHasNoRoomIsNotDeceivedByForcesThatMoveNobodyYet) {
-  // Two grains fill the box from wall to wall, and lean by 10^-6: one may not pass the other, though they come
-  // nearer by 2e-9 m/s only. The firmest steps press them by 0.02 N s each and move nobody, until 37 N s open
-  // a contact. Taken for known before that, in step 4, velocities were wrong by 63 times the claim.
+  // Two grains fill the box from wall to wall, and lean by 10^-6: one may not pass the other, though they
+  // come nearer by 2e-9 m/s only. The firmest steps press them by 0.02 N s each and move nobody, until 37 N s
+  // open a contact. Taken for known before that, in step 4, velocities were wrong by 63 times the claim.
   const AuditedRun run = audited(make_scene("lattice", 201049, {}), 8);
   ASSERT_EQ(run.steps.size(), 8U);
   EXPECT_GE(within_their_claims(run), 5);
