@@ -83,7 +83,7 @@ class Viewed {
                                    : io::FrameParts::places);
   }
   /// Throws std::invalid_argument where frame k was written without what its colours are made of. In a film
-  /// such frames are grey.
+  /// such frames show no forces.
   void demand_colours(std::size_t k) const {
     if (view_.colour == io::GrainColour::force && !frame(k).with_contacts)
       throw std::invalid_argument(

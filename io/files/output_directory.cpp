@@ -173,15 +173,17 @@ void check_output_files(const std::vector<fs::path>& inputs, const std::vector<f
 
 namespace {
 
-/// What `write` makes under the name `draft` takes the place of `path`. What it throws goes on.
+/// What `write` makes under an unfinished name takes the place of `path`. What it throws goes on.
 template <class Write>
-void replace_by(const fs::path& draft, const fs::path& path, const Write& write) {
+void replace_by_draft(const fs::path& path, const Write& write) {
+  fs::path draft = path;
+  draft += unfinished_ending;
   const auto discard = [&] {
     std::error_code ignored;
     fs::remove(draft, ignored);
   };
   try {
-    write();
+    write(draft);
   } catch (...) {
     discard();
     throw;
@@ -196,9 +198,7 @@ void replace_by(const fs::path& draft, const fs::path& path, const Write& write)
 }  // namespace
 
 void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
-  fs::path draft = path;
-  draft += unfinished_ending;
-  replace_by(draft, path, [&] {
+  replace_by_draft(path, [&](const fs::path& draft) {
     detail::Descriptor file(draft, O_WRONLY | O_CREAT | O_TRUNC);
     content([&](std::string_view text) { file.write(text); });
     file.close();
@@ -206,9 +206,7 @@ void write_whole(const fs::path& path, const std::function<void(const WriteText&
 }
 
 void write_by_draft(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  fs::path draft = path;
-  draft += "." + std::to_string(::getpid()) + std::string(unfinished_ending);
-  replace_by(draft, path, [&] {
+  replace_by_draft(path, [&](const fs::path& draft) {
     try {
       write(draft);
     } catch (const fs::filesystem_error& failure) {

@@ -89,8 +89,7 @@ void reserve(const std::filesystem::path& path, std::int64_t bytes);
 /// The same for content that is made piece by piece: `content` calls its argument with the text in order.
 /// What it throws goes on, and the unfinished file is removed.
 void write_whole(const std::filesystem::path& path, const std::function<void(const WriteText&)>& content);
-/// The same for a file that others write: `write` makes it under another name, beside `path`, which nobody
-/// else writes to. What it throws goes on, and the unfinished file is removed.
+/// The same for a file that others write, HDF5 above all: `write` makes it under the unfinished name.
 void write_by_draft(const std::filesystem::path& path,
                     const std::function<void(const std::filesystem::path& draft)>& write);
 
