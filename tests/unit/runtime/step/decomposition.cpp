@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "tests/unit/runtime/step/cut_boxes.hpp"
 
@@ -116,28 +118,35 @@ TEST(Decomposition, ConservesMomentumAcrossABorder) {
 }
 
 TEST(Decomposition, LeavesNoForceBetweenGrainsThatHaveParted) {
-  for (const Variant& variant : variants) {
+  // Four spheres in a row run into one another and rebound, as in ConservesMomentumAcrossABorder.
+  const auto contacts_that_carry = [](const Variant* variant) {
     talus::Setup setup;
     Stage stage;
     stage.name = "rebound";
     stage.time_step = 1e-3;
     stage.laws = laws_of_one_material(0.4, 0, 0.5);
-    stage.end.steps = 5;
+    stage.end.steps = 8;
     setup.stages = {stage};
-    choose(setup, variant, 2);
+    setup.solver.direct_bodies = 0;  // answers of small clusters end at 0
+    if (variant != nullptr) choose(setup, *variant, 2);
     Bodies bodies;
-    for (int k = 0; k < 2; ++k) {
-      add_sphere(bodies, BodyId{k}, Vec3(0.0199 * k, 1e-3 * k, 0), 0.01, 1000.0);
-      bodies.velocity.back().u[0] = 1 - 2 * k;
+    for (int k = 0; k < 4; ++k) {
+      add_sphere(bodies, BodyId{k}, Vec3(0.0199 * k, 1e-3 * k, 0), 0.01, 1000.0 * (k + 1));
+      bodies.velocity.back().u[0] = 2 - k;
     }
     graph::Executor executor({.threads = 1});
     Simulation simulation(setup, bodies, executor);
-    for (int step = 1; step <= *stage.end.steps; ++step) {
-      const StepReport& report = simulation.step();
-      EXPECT_EQ(report.active, step == 1 ? 1 : 0) << variant.name << ", step " << step;
+    std::vector<std::int64_t> active;
+    while (!simulation.finished()) {
+      active.push_back(simulation.step().active);
+      simulation.begin_next_stage();
     }
-    EXPECT_LT(simulation.frame().u[0][0], -0.4) << "they are to rebound";
-  }
+    return active;
+  };
+  const std::vector<std::int64_t> whole = contacts_that_carry(nullptr);
+  ASSERT_GT(whole.front(), 0);
+  ASSERT_EQ(whole.back(), 0) << "they are to part";
+  for (const Variant& variant : variants) EXPECT_EQ(contacts_that_carry(&variant), whole) << variant.name;
 }
 
 // A pressed block drifts with its walls through the cuts, which stay where they are: the contact problem is
