@@ -222,8 +222,10 @@ class Forces {
   }
 
  private:
+  /// The exact velocities are known but for what a next step of Newton's method would change.
   bool known(std::span<const Vec3> r, const Reference& reference) const {
-    return newton_.apart(r, reference.exact) <= limits_.forces_velocities * reference.exchanged;
+    return newton_.apart(r, reference.exact) <=
+           limits_.forces_velocities * reference.exchanged + reference.error;
   }
 
   /// A heavy body on light ones moves by what the law's residual hardly shows, and no proximal step that
