@@ -57,12 +57,12 @@ TurnedClump turned_half(const BallBody& body, double mass, double radius, const 
   };
   const Eigen::Quaterniond quarter = turned(begin, omega_at(begin), time_step / 4),
                            half = turned(begin, omega_at(quarter), time_step / 2);
-  const Mat3 axes = half.normalized().toRotationMatrix();
+  clump.axes = half.normalized().toRotationMatrix();
   clump.inertia = mass * gyration_at(body.gyration, half);
   const double J = clump.inertia.trace() / (3 * radius * radius);
   clump.spin_mobility = 1 / J;
   clump.lengths = Eigen::SelfAdjointEigenSolver<Mat3>(clump.inertia / J).operatorSqrt();
-  for (const Ball& ball : body.balls) clump.balls.push_back({axes * ball.centre, ball.radius});
+  for (const Ball& ball : body.balls) clump.balls.push_back({clump.axes * ball.centre, ball.radius});
   return clump;
 }
 

@@ -28,6 +28,7 @@ struct TurnedClump {
   double spin_mobility = 0;      ///< 1/J [1/kg]
   Vec3 momentum = Vec3::Zero();  ///< [kg m^2/s] as the step begins
   std::vector<Ball> balls;       ///< from the centre of mass [m]
+  Mat3 axes = Mat3::Identity();  ///< from those of the body
   Mat3 gyration = Mat3::Zero();  ///< BallBody
   Vec3 w() const { return lengths * inertia.inverse() * momentum; }
   /// [J] of a turn with that momentum in these axes.

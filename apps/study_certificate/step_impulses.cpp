@@ -72,6 +72,18 @@ Pair pair_of(std::int64_t first, std::int64_t second) {
   return {std::max(first, second), std::min(first, second)};
 }
 
+/// How far the ball of a contact of clumps, which turns on from the middle of the step, ends from where force
+/// `row` of the frame has it [m]: there a point lies in the middle of the gap that the step leaves.
+double away_from(const StepProblem& problem, const StepContact& contact, const Frame& after,
+                 std::size_t row) {
+  if (problem.clumps.empty()) return 0;
+  const std::size_t k = contact.first;
+  const Mat3 on = rotation_of(after.orientation[k]) * problem.clumps[k].axes.transpose();
+  const Vec3 centre = after.x[k] + on * contact.ball.centre;
+  const double apart = contact.ball.radius + after.contact_gap[row] / 2;
+  return (centre - after.contact_point[row] - apart * contact.normal).norm();
+}
+
 }  // namespace
 
 RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
@@ -92,7 +104,7 @@ RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
     for (const std::size_t c : between[pair_of(a, b)]) {
       const StepContact& contact = problem.contacts[c];
       const double sign = after.id[contact.first] == a ? 1 : -1;
-      const double away = (after.x[contact.first] + contact.arm - after.contact_point[k]).norm();
+      const double away = away_from(problem, contact, after, k);
       if (given[c] || !(sign * after.contact_normal[k].dot(contact.normal) > 1 - one_normal)) continue;
       if (best == problem.contacts.size() || away < nearest) best = c, nearest = away;
     }

@@ -183,12 +183,12 @@ class Builder {
     return B;
   }
 
-  /// Of clumps: the arms of both bodies to a point of contact [m].
-  void give_levers(StepContact& contact, const Vec3& point) const {
+  /// Of clumps: the arms of both bodies to a point of contact [m] of a ball of the first.
+  void give_levers(StepContact& contact, const BallAt& ball, const Vec3& point) const {
     if (made_.clumps.empty()) return;
-    contact.arm = point - middle_[contact.first];
+    contact.ball = {ball.place, ball.radius};
     contact.levers.emplace();
-    contact.levers->first = lever(contact.first, contact.arm);
+    contact.levers->first = lever(contact.first, point - middle_[contact.first]);
     if (!contact.at_wall()) contact.levers->second = lever(contact.other(), point - middle_[contact.other()]);
   }
 
@@ -214,7 +214,7 @@ class Builder {
     const double gap = distance - one.radius - other.radius;
     const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
     StepContact contact{i, static_cast<std::ptrdiff_t>(j), normal, 0, pair.friction, drift, d / cell.length};
-    give_levers(contact, centre(one) - (one.radius + gap / 2) * normal);
+    give_levers(contact, one, centre(one) - (one.radius + gap / 2) * normal);
     const double v_n = normal.dot(velocity_before(contact) - cell.rates * k);
     const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
     const double reach = held.reach * std::min(one.radius, other.radius);
@@ -333,7 +333,7 @@ class Builder {
                           0,
                           pair.friction,
                           wall.material_velocity(point, touch.normal)};
-      give_levers(contact, point);
+      give_levers(contact, ball, point);
       const double gap = touch.distance - ball.radius,
                    v_n = touch.normal.dot(velocity_before(contact) - of_wall - contact.drift);
       const InRun carries = in_run(gap, i, -1 - static_cast<std::int64_t>(w));

@@ -41,7 +41,7 @@ struct StepContact {
   /// [N s] that cohesion holds with: the law is that of r + pull n, and free motion has -pull n.
   double pull = 0;
   std::optional<StepLevers> levers = {};  ///< of clumps; those of spheres follow from the normal
-  Vec3 arm = Vec3::Zero();                ///< of clumps: from the centre of the first [m]
+  Ball ball{Vec3::Zero(), 0};             ///< of clumps: of the first, from its centre, in mid-step [m]
   double rolls = 0;                       ///< of a moment: l [m]; else 0
 
   bool is_moment() const { return rolls > 0; }

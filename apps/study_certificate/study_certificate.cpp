@@ -86,9 +86,10 @@ class Progress {
   std::optional<double> said_;  ///< [s] of the last line
 };
 
-/// Largest bounded error over the claim, of the scene's certified and judged steps.
+/// Largest bounded error over the claim of a certified and judged step; nothing is worse than a disputed one.
 double worst_ratio(const AuditedStep& step) {
   double worst = 0;
+  if (step.certified && step.judged == Judged::other_problem) return std::numeric_limits<double>::infinity();
   if (!step.certified || step.judged != Judged::yes) return worst;
   for (const Measure& measure : measures())
     if (measure.bounded) worst = std::max(worst, step.errors.*measure.error / step.claimed);

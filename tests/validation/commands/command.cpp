@@ -1,16 +1,12 @@
 /// `talus run` and `talus plan` as a user meets them: exit codes, messages, files.
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <vector>
 
-#include "io/results/results.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
 #include "tests/validation/commands/command_helpers.hpp"
@@ -358,39 +354,6 @@ TEST_F(Command, WarnsOfGrainsThatBeginDeepInsideOthersOrWalls) {
   EXPECT_TRUE(says(run("run scene.toml --dry-run"), "50 % between grains 3 and 4"));
   write(at("grains.csv"), "id,x,y,z,radius\n3,0,0,0.0095,0.01\n4,0,0,0.0287,0.01\n");
   EXPECT_FALSE(says(run("run scene.toml --dry-run"), "overlap"));
-}
-
-// Of clumps the balls count, and not the spheres that hold them: those of dumbbells overlap at each distance.
-TEST_F(Command, WarnsOfClumpsWhoseBallsBeginDeepInsideOthers) {
-  std::string text = with_bodies(column_scene);
-  text.insert(text.find("[sample]") + 8, "\nshape = \"dumbbell\"");
-  write(at("scene.toml"), text);
-  int overlapping = 0, apart = 0;
-  for (const double distance : {0.008, 0.011, 0.013, 0.016, 0.0195}) {
-    write(at("grains.csv"), fmt::format("id,x,y,z,radius\n3,0,0,1,0.01\n4,0,0,{},0.01\n", 1 + distance));
-    const Outcome outcome = run("run scene.toml --out out --force --steps 1");
-    const Frame frame = io::read_frame(at("out/results.h5"), 0);
-    ASSERT_EQ(frame.orientation.size(), 2U) << outcome.messages;
-    double nearest = 1;
-    for (const double a : {-0.5, 0.5})
-      for (const double b : {-0.5, 0.5}) {
-        const auto ball = [&](std::size_t k, double along) {
-          const auto& q = frame.orientation[k];
-          const Eigen::Quaterniond turn(q[0], q[1], q[2], q[3]);
-          return Vec3(frame.x[k] + turn * Vec3(along * 0.01, 0, 0));
-        };
-        nearest = std::min(nearest, (ball(0, a) - ball(1, b)).norm());
-      }
-    const double depth = (0.01 - nearest) / 0.005;
-    const bool warned = says(outcome, "of more than 10 % of the smaller radius");
-    EXPECT_EQ(warned, depth > 0.1) << distance << ": " << depth << '\n' << outcome.messages;
-    if (warned) {
-      EXPECT_TRUE(says(outcome, fmt::format("the deepest of {:.0f} %", 100 * depth))) << outcome.messages;
-    }
-    ++(depth > 0.1 ? overlapping : apart);
-  }
-  EXPECT_GT(overlapping, 0);
-  EXPECT_GT(apart, 0);
 }
 
 TEST_F(Command, DryRunPrintsTheResolvedSceneAndWritesNothing) {

@@ -1,11 +1,14 @@
 /// What `talus run` says of scenes that are sound and seldom meant, and of steps that are too long.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "io/results/results.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/unit/replaced.hpp"
 #include "tests/validation/commands/command_helpers.hpp"
@@ -234,6 +237,42 @@ TEST_F(Warnings, SayWhatAChosenTimeStepLacks) {
   EXPECT_NE(outcome.messages.find("time_step_max"), std::string::npos) << outcome.messages;
   EXPECT_EQ(run("run scene.toml --dry-run --set time_step_max=1e-3").code, 2)
       << "without auto it says nothing";
+}
+
+// Of clumps the balls count, and not the spheres that hold them: those of dumbbells overlap at each distance.
+TEST_F(Warnings, OfClumpsAreOfBallsThatBeginDeepInsideOthers) {
+  std::string text = with_bodies(column_scene);
+  text.insert(text.find("[sample]") + 8, "\nshape = \"dumbbell\"");
+  write(at("scene.toml"), text);
+  int overlapping = 0, apart = 0;
+  for (const double distance : {0.008, 0.011, 0.013, 0.016, 0.0195}) {
+    write(at("grains.csv"), fmt::format("id,x,y,z,radius\n3,0,0,1,0.01\n4,0,0,{},0.01\n", 1 + distance));
+    const Outcome outcome = run("run scene.toml --out out --force --steps 1");
+    const Frame frame = io::read_frame(at("out/results.h5"), 0);
+    ASSERT_EQ(frame.orientation.size(), 2U) << outcome.messages;
+    double nearest = 1;
+    for (const double a : {-0.5, 0.5})
+      for (const double b : {-0.5, 0.5}) {
+        const auto ball = [&](std::size_t k, double along) {
+          const auto& q = frame.orientation[k];
+          const Eigen::Quaterniond turn(q[0], q[1], q[2], q[3]);
+          return Vec3(frame.x[k] + turn * Vec3(along * 0.01, 0, 0));
+        };
+        nearest = std::min(nearest, (ball(0, a) - ball(1, b)).norm());
+      }
+    const double depth = (0.01 - nearest) / 0.005;
+    const auto says = [&](const std::string& text) {
+      return outcome.messages.find(text) != std::string::npos;
+    };
+    const bool warned = says("of more than 10 % of the smaller radius");
+    EXPECT_EQ(warned, depth > 0.1) << distance << ": " << depth << '\n' << outcome.messages;
+    if (warned) {
+      EXPECT_TRUE(says(fmt::format("the deepest of {:.0f} %", 100 * depth))) << outcome.messages;
+    }
+    ++(depth > 0.1 ? overlapping : apart);
+  }
+  EXPECT_GT(overlapping, 0);
+  EXPECT_GT(apart, 0);
 }
 
 }  // namespace

@@ -79,26 +79,33 @@ TEST(Decomposition, ExchangesInEverySweepWhereSubdomainsAlternate) {
   EXPECT_THROW(validate(setup), std::invalid_argument);
 }
 
+/// Four spheres in a row that run into one another, in eight steps. Cut in two the middle ones stand in both.
+struct ARow {
+  talus::Setup setup;
+  Bodies bodies;
+
+  explicit ARow(double restitution) {
+    Stage stage;
+    stage.name = "collide";
+    stage.time_step = 1e-3;
+    stage.laws = laws_of_one_material(0.4, 0, restitution);
+    stage.end.steps = 8;
+    setup.stages = {stage};
+    for (int k = 0; k < 4; ++k) {
+      add_sphere(bodies, BodyId{k}, Vec3(0.0199 * k, 1e-3 * k, 0), 0.01, 1000.0 * (k + 1));
+      bodies.velocity.back().u[0] = 2 - k;
+      bodies.velocity.back().u[1] = 0.3 * k;
+    }
+  }
+};
+
 TEST(Decomposition, ConservesMomentumAcrossABorder) {
-  // Four spheres in a row, the cut between the middle ones, so that these stand in both subdomains.
   for (const Variant& variant : variants)
     for (bool damping : {true, false}) {
-      talus::Setup setup;
-      Stage stage;
-      stage.name = "collide";
-      stage.time_step = 1e-3;
-      stage.laws = laws_of_one_material(0.4, 0, 0);
-      stage.end.steps = 8;
-      setup.stages = {stage};
+      auto [setup, bodies] = ARow(0);
       setup.solver.max_iterations = 7;  // a solution that is not finished conserves it too
       choose(setup, variant, 2);
       setup.decomposition.damping = damping;
-      Bodies bodies;
-      for (int k = 0; k < 4; ++k) {
-        add_sphere(bodies, BodyId{k}, Vec3(0.0199 * k, 1e-3 * k, 0), 0.01, 1000.0 * (k + 1));
-        bodies.velocity.back().u[0] = 2 - k;
-        bodies.velocity.back().u[1] = 0.3 * k;
-      }
       Vec3 before = Vec3::Zero(), after = Vec3::Zero();
       for (std::size_t k = 0; k < 4; ++k)
         before += bodies.mass(k) * Eigen::Map<const Vec3>(bodies.velocity[k].u);
@@ -118,22 +125,10 @@ TEST(Decomposition, ConservesMomentumAcrossABorder) {
 }
 
 TEST(Decomposition, LeavesNoForceBetweenGrainsThatHaveParted) {
-  // Four spheres in a row run into one another and rebound, as in ConservesMomentumAcrossABorder.
   const auto contacts_that_carry = [](const Variant* variant) {
-    talus::Setup setup;
-    Stage stage;
-    stage.name = "rebound";
-    stage.time_step = 1e-3;
-    stage.laws = laws_of_one_material(0.4, 0, 0.5);
-    stage.end.steps = 8;
-    setup.stages = {stage};
+    auto [setup, bodies] = ARow(0.5);
     setup.solver.direct_bodies = 0;  // answers of small clusters end at 0
     if (variant != nullptr) choose(setup, *variant, 2);
-    Bodies bodies;
-    for (int k = 0; k < 4; ++k) {
-      add_sphere(bodies, BodyId{k}, Vec3(0.0199 * k, 1e-3 * k, 0), 0.01, 1000.0 * (k + 1));
-      bodies.velocity.back().u[0] = 2 - k;
-    }
     graph::Executor executor({.threads = 1});
     Simulation simulation(setup, bodies, executor);
     std::vector<std::int64_t> active;
