@@ -7,9 +7,12 @@
 #include <string>
 #include <tuple>
 
+#include "kernels/samples/detail/growing_cells.hpp"
 #include "kernels/samples/detail/radius_slices.hpp"
+#include "kernels/samples/detail/site_kernels.hpp"
 #include "kernels/samples/resting_site.hpp"
 #include "kernels/samples/sample.hpp"
+#include "kernels/simd/instruction_set.hpp"
 
 namespace talus {
 
@@ -58,48 +61,6 @@ struct Higher {
   }
 };
 
-/// Grains by cubic cells; layers are added as the sample grows.
-class Cells {
- public:
-  Cells(double side, double length_x, double length_y)
-      : side_(side),
-        nx_(static_cast<std::int64_t>(length_x / side) + 1),
-        ny_(static_cast<std::int64_t>(length_y / side) + 1) {}
-
-  void add(std::int32_t grain, const Vec3& x) {
-    const std::int64_t layer = index(x[2]);
-    if (static_cast<std::size_t>((layer + 1) * nx_ * ny_) > head_.size())
-      head_.resize(static_cast<std::size_t>((layer + 1) * nx_ * ny_), none);
-    std::int32_t& head = head_[cell(index(x[0]), index(x[1]), layer)];
-    next_.push_back(head);
-    head = grain;
-  }
-
-  /// visit(grain) for every grain whose centre may lie within `reach` of x, until it returns false.
-  template <class Visit>
-  void visit_near(const Vec3& x, double reach, const Visit& visit) const {
-    const std::int64_t layers = static_cast<std::int64_t>(head_.size()) / (nx_ * ny_);
-    const auto low = [&](int axis) { return std::max<std::int64_t>(index(x[axis] - reach), 0); };
-    const auto high = [&](int axis, std::int64_t n) { return std::min(index(x[axis] + reach), n - 1); };
-    for (std::int64_t k = low(2); k <= high(2, layers); ++k)
-      for (std::int64_t j = low(1); j <= high(1, ny_); ++j)
-        for (std::int64_t i = low(0); i <= high(0, nx_); ++i)
-          for (std::int32_t g = head_[cell(i, j, k)]; g != none; g = next_[static_cast<std::size_t>(g)])
-            if (!visit(g)) return;
-  }
-
- private:
-  static constexpr std::int32_t none = -1;
-  std::int64_t index(double x) const { return static_cast<std::int64_t>(std::floor(x / side_)); }
-  std::size_t cell(std::int64_t i, std::int64_t j, std::int64_t k) const {
-    return static_cast<std::size_t>((k * ny_ + j) * nx_ + i);
-  }
-
-  double side_;
-  std::int64_t nx_, ny_;
-  std::vector<std::int32_t> head_, next_;
-};
-
 class Deposition {
   using Slices = detail::RadiusSlices;
 
@@ -111,7 +72,9 @@ class Deposition {
         ly_(length_y),
         cells_(2 * largest, length_x, length_y),
         slices_(smallest, largest),
-        heaps_(Slices::end) {
+        heaps_(Slices::end),
+        sieve_(best_instruction_set() == InstructionSet::portable ? site_kernels_portable
+                                                                  : site_kernels_avx2) {
     grains_.reserve(n);
     for (const std::int32_t x : {x_low, x_high})
       for (const std::int32_t y : {y_low, y_high}) add_site({floor_plane, x, y}, 0, {smallest, largest});
@@ -295,9 +258,8 @@ class Deposition {
     });
     for (Near& n : near_) n.obstacle = obstacle(n.index, grains_.back());
     cells_.add(g, x);
-    for (const Near& first : near_)
-      for (const Near& second : near_)
-        if (first.index > second.index) add_sites_on(g, first, second);
+    sieve();
+    for (const auto& [first, second] : pairs_) add_sites_on(g, near_[first], near_[second]);
   }
 
   struct Near {
@@ -306,12 +268,39 @@ class Deposition {
     Obstacle obstacle;
   };
 
+  /// Fills `pairs_` with what may be supports beside the youngest grain, the older one second. Most pairs
+  /// have no site, and most of these show it by bounds, which several lanes look at together.
+  void sieve() {
+    for (std::vector<double>& component : components_) component.clear();
+    const auto list = [&](const std::array<double, 7>& values) {
+      for (std::size_t c = 0; c < values.size(); ++c) components_[c].push_back(values[c]);
+    };
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    std::size_t floor = near_.size();
+    for (const Near& n : near_) {
+      const Obstacle& o = n.obstacle;
+      if (n.index == floor_plane) floor = static_cast<std::size_t>(&n - near_.data());
+      list({o.d[0], o.d[1], o.d[2], o.e0, o.e1, o.round ? 1.0 : 0.0,
+            o.round ? grain(n.index).radius : infinity});
+    }
+    for (std::size_t k = 0; k < obstacle_padding; ++k) list({0, 0, 0, infinity, 0, 0, 0});
+    const auto of = [&](std::size_t c) { return components_[c].data(); };
+    const ObstacleView obstacles{of(0), of(1), of(2), of(3), of(4), of(5), of(6), near_.size(), floor};
+    const SiteRule rule{grains_.back().radius, smallest_, largest_, stable_slack, clear_slack()};
+    possible_.resize(near_.size() + obstacle_padding);
+    pairs_.clear();
+    for (std::uint32_t one = 0; one < near_.size(); ++one) {
+      sieve_(obstacles, one, rule, possible_.data());
+      for (std::uint32_t k = one + 1; k < near_.size(); ++k)
+        if (possible_[k] != 0)
+          pairs_.push_back(std::minmax(
+              one, k, [&](std::uint32_t a, std::uint32_t b) { return near_[a].index > near_[b].index; }));
+    }
+    std::sort(pairs_.begin(), pairs_.end());
+  }
+
   /// The sites on grain g and two obstacles near it, in descending order.
   void add_sites_on(std::int32_t g, const Near& first, const Near& second) {
-    if (second.index >= 0) {
-      const double reach = grain(first.index).radius + grain(second.index).radius + 2 * largest_;
-      if ((first.obstacle.d - second.obstacle.d).squaredNorm() > reach * reach) return;
-    }
     const bool on_floor = first.index == floor_plane || second.index == floor_plane;
     for (const int side : {1, -1}) {
       if (side < 0 && !on_floor) return;
@@ -320,11 +309,12 @@ class Deposition {
       ranges_.assign(1, {smallest_, largest_});
       bound_root(ranges_[0], curve);
       keep_real(curve, ranges_);
-      if (!on_floor && !ranges_.empty()) keep_stable(curve, first.obstacle, second.obstacle, 1e-12, ranges_);
+      if (!on_floor && !ranges_.empty())
+        keep_stable(curve, first.obstacle, second.obstacle, stable_slack, ranges_);
       for (const Near& n : near_) {
         if (ranges_.empty()) break;
         if (n.index != first.index && n.index != second.index)
-          keep_clear(curve, n.obstacle, 0.5 * slack(), ranges_);
+          keep_clear(curve, n.obstacle, clear_slack(), ranges_);
       }
       for (const RadiusRange& range : ranges_)
         add_site({g, first.index, second.index}, static_cast<std::int8_t>(side), range);
@@ -361,17 +351,23 @@ class Deposition {
 
   /// Squared distances are good to this [m^2]: rounding of a few products, with room to spare.
   double slack() const { return 1e-12 * largest_ * largest_; }
+  double clear_slack() const { return 0.5 * slack(); }
+  static constexpr double stable_slack = 1e-12;
 
   double smallest_, largest_, lx_, ly_;
-  Cells cells_;
+  detail::GrowingCells cells_;
   std::vector<LyingGrain> grains_;
   std::vector<Site> sites_;
   std::vector<std::int32_t> free_;
   Slices slices_;
   std::vector<std::vector<Entry>> heaps_;             ///< by slice
   std::vector<std::pair<Entry, std::size_t>> aside_;  ///< entries and their slices; scratch
-  std::vector<Near> near_;                            ///< scratch
-  RadiusRanges ranges_;                               ///< scratch
+  SieveSites sieve_;
+  std::vector<Near> near_;                                      ///< scratch
+  std::array<std::vector<double>, 7> components_;               ///< of what is near; scratch
+  std::vector<unsigned char> possible_;                         ///< scratch
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  ///< of what is near; scratch
+  RadiusRanges ranges_;                                         ///< scratch
 };
 
 }  // namespace

@@ -39,7 +39,7 @@ const std::vector<Room>& rooms() {
       {"kernels/delassus", {"kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
       {"kernels/clusters", {"kernels/bodies", "kernels/law", "kernels/global", "kernels/delassus"}},
       {"kernels/fields", {"kernels/bodies"}},
-      {"kernels/samples", {"kernels/bodies", "kernels/shapes", "kernels/detection"}},
+      {"kernels/samples", {"kernels/simd", "kernels/bodies", "kernels/shapes", "kernels/detection"}},
       {"io/files", {}},
       {"io/fclib", {"io/files"}},
       {"io/results", {"io/files"}},
