@@ -119,6 +119,7 @@ void place_sample(Prepared& run) {
     run.sample = build_sample(run.scene);
   }
   io::place_walls(run.scene, run.sample);
+  run.scene.setup.stress_at_start = stress_at_start(run.sample, run.forces, run.scene.setup);
 }
 
 /// Where the run goes on, if it does. Collective, but for what it throws.
@@ -373,7 +374,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
       write_page(terminal, run.directory, false);
     return *run.nothing_left;
   }
-  share_walls(run.scene.setup, ranks);
+  share_start(run.scene.setup, ranks);
   try {
     return run_scene(options, ranks, terminal, std::move(run), began);
   } catch (const std::exception& error) {

@@ -13,7 +13,7 @@
 
 namespace talus {
 
-void share_walls(Setup& setup, const graph::Communicator& ranks) {
+void share_start(Setup& setup, const graph::Communicator& ranks) {
   std::vector<double*> values;
   for (Wall& wall : setup.walls) {
     for (Vec3* vector : {&wall.point, &wall.velocity})
@@ -22,6 +22,7 @@ void share_walls(Setup& setup, const graph::Communicator& ranks) {
   }
   for (Stage& stage : setup.stages)
     for (auto& [name, load] : stage.loads) values.push_back(&load.mass);
+  for (double& stress : setup.stress_at_start) values.push_back(&stress);
   std::vector<double> own;
   if (ranks.rank() == 0)
     for (const double* value : values) own.push_back(*value);

@@ -11,8 +11,8 @@
 namespace talus {
 
 /// Collective. Shares what rank 0 alone knows when it has made the sample: where the walls stand, how
-/// they move, what they weigh, and the ids of bodies with names.
-void share_walls(Setup& setup, const graph::Communicator& ranks);
+/// they move, what they weigh, the stress of a state, and the ids of bodies with names.
+void share_start(Setup& setup, const graph::Communicator& ranks);
 
 /// Collective. True when any rank refuses to run: `why` says it for this one, "" when it does not. Rank 0
 /// speaks on stderr for all: of itself, or else says each sentence once.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <string>
@@ -41,6 +42,7 @@ StateSample state_of_frame(const io::Scene& scene) {
   state.walls = frame.walls;
   state.clumps = io::holds_clumps(file);
   state.domain = frame.domain;
+  state.materials = io::material_names(file);
   for (std::size_t k = 0; k < frame.id.size(); ++k)
     add_body(frame.id[k], frame.x[k], frame.radius[k], frame.u[k],
              frame.omega.empty() ? Vec3(Vec3::Zero()) : Vec3(frame.radius[k] * frame.omega[k]), state.sample);
@@ -113,6 +115,7 @@ StateSample state_of_checkpoint(const io::Scene& scene) {
   }
   state.domain = before.setup.domain;
   state.clumps = !before.setup.clumps.empty();
+  for (const io::MaterialSpec& material : before.materials) state.materials.push_back(material.name);
   restore_cell(head, state.domain);
   std::vector<std::int32_t> subdomains(static_cast<std::size_t>(head.subdomains));
   std::iota(subdomains.begin(), subdomains.end(), 0);
@@ -144,6 +147,30 @@ bool same_cell(const Domain& a, const Domain& b) {
          (!a.repeats || (a.low - b.low).cwiseAbs().maxCoeff() <= small);
 }
 
+/// Materials of the scene for those of the same name; or what the scene lacks.
+std::string name_materials(const io::Scene& scene, const std::vector<std::string>& names, Sample& sample) {
+  if (scene.materials.empty()) {
+    const bool alike =
+        std::ranges::adjacent_find(sample.material, std::not_equal_to()) == sample.material.end();
+    sample.material.clear();
+    return alike ? ""
+                 : "its bodies are of several materials, and the scene names none: write its [[material]]s";
+  }
+  if (sample.material.empty()) return "";
+  const std::string& given = scene.samples.front().material;
+  if (!given.empty())
+    return fmt::format("it says of which material each body is: leave `material = \"{}\"` out", given);
+  for (Material& material : sample.material) {
+    const std::string name = material < names.size() ? names[material] : fmt::format("number {}", material);
+    const auto found = std::ranges::find(scene.materials, name, &io::MaterialSpec::name);
+    if (found == scene.materials.end())
+      return fmt::format("it has bodies of material '{}', and the scene has no [[material]] of that name",
+                         name);
+    material = static_cast<Material>(found - scene.materials.begin());
+  }
+  return "";
+}
+
 /// The flow of the next stage would come on top of that of the last one.
 void leave_flow(const Domain& domain, Sample& sample) {
   if (!domain.repeats) return;
@@ -171,12 +198,25 @@ StateSample read_state(const io::Scene& scene) {
   Sample& sample = state.sample;
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;
-  if (scene.materials.empty()) sample.material.clear();
-  for (const Material material : sample.material)
-    if (material >= scene.materials.size())
-      refuse(fmt::format("it has bodies of material {}, and the scene has {}", material,
-                         scene.materials.size()));
+  if (const std::string unknown = name_materials(scene, state.materials, sample); !unknown.empty())
+    refuse(unknown);
   return state;
+}
+
+CellVelocity stress_at_start(const Sample& sample, std::span<const GivenForce> forces, const Setup& setup) {
+  CellVelocity stress{};
+  if (!setup.domain.repeats) return stress;
+  std::map<std::int64_t, const Vec3*> centre;
+  for (std::size_t k = 0; k < sample.size(); ++k)
+    centre[static_cast<std::int64_t>(sample.id_of(k))] = &sample.x[k];
+  for (const GivenForce& force : forces) {
+    const auto first = centre.find(force.first), second = centre.find(force.second);
+    if (first == centre.end() || second == centre.end()) continue;
+    add_impulse(Vec3(force.force), setup.domain.separation(*first->second, *second->second), stress);
+  }
+  const double volume = setup.domain.volume(setup.walls);
+  for (double& component : stress) component = volume > 0 ? component / volume : 0;
+  return stress;
 }
 
 void place_walls_of(const std::vector<WallReport>& walls, io::Scene& scene) {

@@ -108,9 +108,13 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
     graph::Executor executor({.threads = 1});
     Simulation simulation(scene.setup, bodies, executor);
     double stage_began = 0;
+    std::vector<double> stage_times;
     while (!simulation.finished() && static_cast<std::int64_t>(run.steps.size()) < plan.steps) {
       Start start = start_of(simulation);
-      if (simulation.steps_of_stage() == 0) stage_began = start.before.time;
+      if (simulation.steps_of_stage() == 0) {
+        stage_times.resize(start.stage_index, start.before.time - stage_began);
+        stage_began = start.before.time;
+      }
       const auto run_start = Clock::now();
       run.of_run = true;
       const StepReport& report = simulation.step();
@@ -138,6 +142,7 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
                             scene.setup,
                             start.stage_index,
                             start.before.time - stage_began,
+                            stage_times,
                             &after};
       const StepProblem problem = rebuild_step(input);
       step.shift = unexplained_shift(input, solver.overlap_correction, after);

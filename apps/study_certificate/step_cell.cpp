@@ -54,17 +54,16 @@ Mat3 with_walled_axes(Mat3 edges) {
 
 /// The stress that component k aims at, `time` [s] after the beginning of a stage [Pa]; 0 where the stage
 /// prescribes the flow.
-double aimed_at(const Setup& setup, std::size_t stage, double time, std::size_t k) {
-  const StressLoad& load = setup.stages[stage].stress;
+double aimed_at(const StepInput& input, std::size_t stage, double time, std::size_t k) {
+  const StressLoad& load = input.setup.stages[stage].stress;
   if (!load.to[k]) return 0;
   double aim = *load.to[k];
   if (time < load.ramp_time) {
-    const double from =
-        stage > 0 ? aimed_at(setup, stage - 1, std::numeric_limits<double>::infinity(), k) : 0;
+    const double from = stage > 0 ? aimed_at(input, stage - 1, input.stage_times[stage - 1], k)
+                                  : input.setup.stress_at_start[k];
     aim = from + (aim - from) * time / load.ramp_time;
   }
-  if (load.period > 0 && std::isfinite(time))
-    aim += load.amplitude[k] * std::sin(2 * std::numbers::pi * time / load.period);
+  if (load.period > 0) aim += load.amplitude[k] * std::sin(2 * std::numbers::pi * time / load.period);
   return aim;
 }
 
@@ -118,7 +117,7 @@ Mat3 load_cell(const StepInput& input, std::span<const double> masses, double ac
   for (std::size_t k = 0; k < 6; ++k) {
     if (!input.stage.stress.to[k]) continue;
     const auto row = static_cast<Eigen::Index>(k);
-    const double aim = aimed_at(input.setup, input.stage_index, input.time + 0.5 * input.stage.time_step, k);
+    const double aim = aimed_at(input, input.stage_index, input.time + 0.5 * input.stage.time_step, k);
     cell.mobility[row] = 1 / mass;
     cell.load[row] = volume * aim / cell.length;
     gained[row] = acts * (motion[row] - volume * aim) / (mass * cell.length * cell.length);

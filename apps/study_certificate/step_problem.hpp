@@ -83,14 +83,15 @@ struct StepProblem {
 
 /// The scene's part of a step: what does not change within it.
 struct StepInput {
-  const Frame& before;            ///< positions and velocities
-  std::span<const Wall> walls;    ///< positions and velocities before the step, loads in force
-  std::span<const double> loads;  ///< of each wall, along its normal [N]
-  const Stage& stage;             ///< time step, gravity, laws
-  const Bodies& bodies;           ///< masses, by id, in any order
-  const Setup& setup;             ///< alert distance, overlap correction, rotation, cell
-  std::size_t stage_index = 0;    ///< of `stage` in the setup
-  double time = 0;                ///< since the stage began [s]
+  const Frame& before;                       ///< positions and velocities
+  std::span<const Wall> walls;               ///< positions and velocities before the step, loads in force
+  std::span<const double> loads;             ///< of each wall, along its normal [N]
+  const Stage& stage;                        ///< time step, gravity, laws
+  const Bodies& bodies;                      ///< masses, by id, in any order
+  const Setup& setup;                        ///< alert distance, overlap correction, rotation, cell
+  std::size_t stage_index = 0;               ///< of `stage` in the setup
+  double time = 0;                           ///< since the stage began [s]
+  std::span<const double> stage_times = {};  ///< how long the stages before took [s]
   /// If given: which side of nothing a gap of rounding is on, of bodies that carry in it. That decides
   /// whether bodies that bounce off one another are a contact.
   const Frame* after = nullptr;

@@ -30,7 +30,7 @@ using detail::Place;
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they stand in memory");
 
-constexpr std::int64_t format_version = 8;
+constexpr std::int64_t format_version = 9;
 
 /// 64 bits of every byte and its place; no cryptography, but any flipped bit shows. The CRC-32 of
 /// io/files/crc.hpp is as fast and would do for columns, too, but another checksum is another version of the

@@ -107,6 +107,10 @@ void demand_kept_frames(const std::filesystem::path& path, std::size_t kept);
 /// earlier versions do not tell. Throws FileError when it is no results.h5.
 bool holds_clumps(const std::filesystem::path& path);
 
+/// Names of the materials of its bodies, by number; empty where they have none. Throws FileError when it is
+/// no results.h5.
+std::vector<std::string> material_names(const std::filesystem::path& path);
+
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);
 

@@ -151,6 +151,15 @@ bool holds_clumps(const std::filesystem::path& path) {
   });
 }
 
+std::vector<std::string> material_names(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  return read_while_written(name, [&name]() -> std::vector<std::string> {
+    const Hdf5Object file = open_results(name);
+    if (H5Lexists(file.id(), "materials", H5P_DEFAULT) <= 0) return {};
+    return read_names({file.id(), name}, "/materials/name");
+  });
+}
+
 std::size_t demand_frames(const std::filesystem::path& path) {
   const std::size_t frames = frame_count(path);
   if (frames > 0) return frames;

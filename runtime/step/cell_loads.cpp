@@ -1,8 +1,6 @@
 #include "runtime/step/cell_loads.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "runtime/step/cell_report.hpp"
@@ -11,20 +9,21 @@ namespace talus {
 
 namespace {
 
-/// When a stage ends that the run has left: nobody asks before.
-constexpr double ended = std::numeric_limits<double>::infinity();
+/// The stage before ended when this one began, perhaps within its own ramp.
+StageMoment end_of_stage_before(const StageMoment& at) {
+  return {at.stage - 1, at.stage_begins[at.stage] - at.stage_begins[at.stage - 1], at.stage_begins};
+}
 
 double aim(const Setup& setup, const StageMoment& at, std::size_t k) {
   const StressLoad& load = setup.stages[at.stage].stress;
   if (!load.to[k]) return 0;
-  const double to = *load.to[k];
-  double from = to;
-  if (load.ramp_time > 0 && at.time < load.ramp_time)
-    from = at.stage > 0 ? aim(setup, {at.stage - 1, ended}, k) : 0;
-  const double part = load.ramp_time > 0 ? std::min(1.0, at.time / load.ramp_time) : 1;
-  const double swing =
-      load.period > 0 && std::isfinite(at.time) ? std::sin(2 * std::numbers::pi * at.time / load.period) : 0;
-  return from + (to - from) * part + load.amplitude[k] * swing;
+  double reached = *load.to[k];
+  if (at.time < load.ramp_time) {
+    const double from = at.stage > 0 ? aim(setup, end_of_stage_before(at), k) : setup.stress_at_start[k];
+    reached = from + (reached - from) * (at.time / load.ramp_time);
+  }
+  const double swing = load.period > 0 ? std::sin(2 * std::numbers::pi * at.time / load.period) : 0;
+  return reached + load.amplitude[k] * swing;
 }
 
 }  // namespace
@@ -49,7 +48,7 @@ CellDrive drive_cell(const Setup& setup, const StageMoment& at, const StepParame
   if (!cell.loaded()) return drive;
   CellVelocity gain{};
   // In the middle of the step, as the edges are.
-  cell.aim = stress_aimed_at(setup, {at.stage, at.time + 0.5 * parameters.time_step});
+  cell.aim = stress_aimed_at(setup, {at.stage, at.time + 0.5 * parameters.time_step, at.stage_begins});
   const CellVelocity kinetic = components_of(kinetic_moment(state, gradient_before(state.domain, 0), ranks));
   const double volume = state.domain.volume(state.walls);
   for (std::size_t k = 0; k < cell_freedoms; ++k) {

@@ -2,6 +2,8 @@
 
 /// What a stage loads a periodic cell with.
 
+#include <span>
+
 #include "runtime/step/cell_flow.hpp"
 #include "runtime/step/step_report.hpp"
 
@@ -9,8 +11,9 @@ namespace talus {
 
 /// Where in the run a step stands.
 struct StageMoment {
-  std::size_t stage = 0;  ///< index
-  double time = 0;        ///< since the stage began [s]
+  std::size_t stage = 0;                      ///< index
+  double time = 0;                            ///< since the stage began [s]
+  std::span<const double> stage_begins = {};  ///< times of the run at which the stages up to it began [s]
 };
 
 /// The stress that each component aims at [Pa]; 0 where the stage prescribes the flow.

@@ -126,6 +126,7 @@ struct CheckpointHead {
   /// Of a cell that flows, else empty: xx, yy, zz, xy, xz, yz of its edges [m], of their rates [m/s], and of
   /// the edges at the last broad phase [m].
   std::vector<double> cell_edges, cell_rates, cell_edges_then;
+  std::vector<double> stress_at_start;  ///< Setup::stress_at_start
 
   bool candidates_valid = false;
   std::int64_t impulse_kind = 3;
@@ -198,6 +199,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("cell_edges", head.cell_edges);
   visit("cell_rates", head.cell_rates);
   visit("cell_edges_then", head.cell_edges_then);
+  visit("stress_at_start", head.stress_at_start);
   visit("candidates_valid", head.candidates_valid);
   visit("impulse_kind", head.impulse_kind);
   visit("overlaps_given", head.overlaps_given);

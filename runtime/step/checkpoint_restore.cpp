@@ -168,6 +168,7 @@ StepState restore_state(const Setup& setup, const Checkpoint& from, const graph:
   state.decomposition = make_decomposition(with_subdomains(setup.decomposition, head.subdomains), ranks);
   Decomposition& all = state.decomposition;
   demand(from.parts.size() == all.here.size(), "subdomains");
+  demand(head.stress_at_start.size() == cell_freedoms, "the stress of its sample");
   restore_partition(head, all);
   state.walls = setup.walls;
   simplify_motions(state.walls);  // in their first places, as when the run began

@@ -67,7 +67,8 @@ struct StageEnd {
 /// The stress that components of a periodic cell follow, as it pushes the grains together: xx, yy, zz, xy,
 /// xz, yz [Pa]. In a stage that began t ago a component aims at
 ///   from + (to - from) min(1, t/ramp_time) + amplitude sin(2 pi t/period),
-/// `from` what the stage before aimed at in its end, or 0 where it prescribed the flow.
+/// `from` what the stage before aimed at when it ended, perhaps within its own ramp, or 0 where it prescribed
+/// the flow; of the first stage Setup::stress_at_start.
 struct StressLoad {
   std::array<std::optional<double>, 6> to;  ///< [Pa]; without one a component is driven at its rate
   double ramp_time = 0;                     ///< [s]; 0: at once
@@ -259,6 +260,9 @@ struct Setup {
   /// Mass of a cell that follows a stress, over that of all grains, > 0 (docs/theory.md, "Cells under
   /// stress").
   double cell_inertia = 1;
+  /// What ramps of the first stage begin from, xx, yy, zz, xy, xz, yz [Pa]: the stress of a sample that was
+  /// in a periodic cell before.
+  std::array<double, 6> stress_at_start{};
   std::vector<Wall> walls;
   std::vector<WallGroup> groups = {};  ///< that walls name
   std::vector<Clump> clumps;           ///< shapes of bodies that are no spheres (Bodies::shape)

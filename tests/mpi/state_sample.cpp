@@ -1,6 +1,7 @@
 /// [sample] kind = "state": runs that begin where another one was.
 
 #include <algorithm>
+#include <numbers>
 
 #include "io/results/results.hpp"
 #include "tests/mpi/launcher.hpp"
@@ -174,6 +175,58 @@ every_steps = 425
   EXPECT_LT(errors[0], 0.5) << "forces came along at all";
 }
 
+// A sample that was pressed once is sheared under a stress that rises: it is not let go first.
+TEST_F(BegunInACell, ARampBeginsFromTheStressThatTheStateBears) {
+  const std::string cell = R"(
+time_step = 1e-4
+[material]
+density = 2600
+[cell]
+lengths = [{0}]
+[sample]
+{1}
+[[stage]]
+name = "go"
+stress = {{ xx = {2}, yy = {2}, zz = {2}, ramp_time = {3} }}
+end = {{ steps = {4} }}
+[decomposition]
+subdomains = 2
+[output]
+every_steps = 1
+pictures = false
+)";
+  const std::string grains =
+      "kind = \"random\"\ncount = 60\nradius_distribution = \"uniform\"\nradius_min = 0.0009\n"
+      "radius_max = 0.0011";
+  write(at("press.toml"), fmt::format(fmt::runtime(cell), "0.0094, 0.0094, 0.0094", grains, 1000, 0, 600));
+  ASSERT_EQ(run(1,
+                "run press.toml --out press --threads 1 --set checkpoint.every_steps=600 --set "
+                "allow_unconverged=true")
+                .code,
+            0);
+  const PeriodicSpace pressed = last_frame("press").domain.cell;
+  const std::string edges = fmt::format("{}, {}, {}", pressed.xx, pressed.yy, pressed.zz);
+  for (const std::string from : {"results.h5", "checkpoint_000600.h5"}) {
+    write(at("go.toml"), fmt::format(fmt::runtime(cell), edges,
+                                     "kind = \"state\"\nfile = \"press/" + from + "\"", 3000, 0.2, 10));
+    const auto pressure = [&](const std::string& out) {
+      const auto table = read_table(at(out) / "cell.csv");
+      const auto row = table.rows.size() - 1;
+      double sum = 0;
+      for (const std::string axis : {"xx", "yy", "zz"})
+        sum += table.number(row, "stress_" + axis) + table.number(row, "kinetic_" + axis);
+      return sum / 3;
+    };
+    ASSERT_EQ(run(1, "run go.toml --out go --force --threads 1").code, 0);
+    EXPECT_NEAR(pressure("go"), 1000 + 2000 * 0.00095 / 0.2, 3) << from;
+    // What the state bore is not asked of it again behind a stop, and other ranks are told.
+    fs::remove_all(at("parts"));
+    ASSERT_EQ(run(2, "run go.toml --out parts --resume --threads 1 --steps 3").code, 0);
+    ASSERT_EQ(run(1, "run go.toml --out parts --resume --threads 1").code, 0);
+    EXPECT_EQ(digest_of("parts"), digest_of("go")) << from;
+  }
+}
+
 TEST_F(BegunInACell, AnotherCellThanThatOfTheStateIsRefused) {
   for (const std::string from : {"results.h5", "checkpoint_000015.h5"}) {
     write(at("branch.toml"),
@@ -182,6 +235,62 @@ TEST_F(BegunInACell, AnotherCellThanThatOfTheStateIsRefused) {
     EXPECT_EQ(branch.code, 2) << from;
     EXPECT_NE(branch.messages.find("shears = [0.00"), std::string::npos) << branch.messages;
     EXPECT_FALSE(fs::exists(at("branch")));
+  }
+}
+
+class StateOfMaterials : public OnRanks {
+ protected:
+  /// A light and a heavy grain on a floor, or the state of them.
+  std::string scene(const std::string& materials, const std::string& sample) const {
+    return "gravity = [0, 0, -9.81]\n" + materials + sample +
+           "[[wall]]\nname = \"z-\"\nposition = 0\n[[stage]]\ntime_step = 1e-4\nend = { steps = 5 }\n"
+           "[checkpoint]\nevery_steps = 5\n";
+  }
+  const std::string glass = "[[material]]\nname = \"glass\"\ndensity = 2500\n";
+  const std::string lead = "[[material]]\nname = \"lead\"\ndensity = 11000\n";
+  const std::string bodies =
+      "[[sample]]\nkind = \"body\"\nname = \"g\"\nmaterial = \"glass\"\nradius = 0.01\n"
+      "position = [0, 0, 0.01]\n"
+      "[[sample]]\nkind = \"body\"\nname = \"l\"\nmaterial = \"lead\"\nradius = 0.01\n"
+      "position = [0.1, 0, 0.01]\n";
+  std::string state(const std::string& file, const std::string& more = "") const {
+    return "[[sample]]\nkind = \"state\"\nfile = \"first/" + file + "\"\n" + more;
+  }
+  double torque(const std::string& out) const {
+    const auto walls = read_table(at(out) / "walls.csv");
+    return walls.number(walls.rows.size() - 1, "torque_y");
+  }
+};
+
+TEST_F(StateOfMaterials, AreThoseOfTheSameName) {
+  write(at("first.toml"), scene(glass + lead, bodies));
+  ASSERT_EQ(run(1, "run first.toml --out first --threads 1").code, 0);
+  const double weight = 11000 * 4.0 / 3 * std::numbers::pi * 1e-6 * 9.81;
+  ASSERT_NEAR(torque("first"), -0.1 * weight, 1e-6 * weight);
+  for (const std::string file : {"results.h5", "checkpoint_000005.h5"}) {
+    write(at("other.toml"),
+          scene(lead + "[[material]]\nname = \"steel\"\ndensity = 7800\n" + glass, state(file)));
+    const Outcome other = run(1, "run other.toml --out other --force --threads 1");
+    ASSERT_EQ(other.code, 0) << other.messages;
+    EXPECT_NEAR(torque("other"), -0.1 * weight, 1e-6 * weight) << file;
+  }
+}
+
+TEST_F(StateOfMaterials, ThatTheSceneDoesNotNameAreRefused) {
+  write(at("first.toml"), scene(glass + lead, bodies));
+  ASSERT_EQ(run(1, "run first.toml --out first --threads 1").code, 0);
+  const auto refused = [&](const std::string& text, const std::string& said) {
+    write(at("other.toml"), text);
+    const Outcome other = run(1, "run other.toml --out other --threads 1");
+    EXPECT_EQ(other.code, 2);
+    EXPECT_NE(other.messages.find(said), std::string::npos) << other.messages;
+    EXPECT_FALSE(fs::exists(at("other")));
+  };
+  for (const std::string file : {"results.h5", "checkpoint_000005.h5"}) {
+    refused(scene(glass + "[[material]]\nname = \"steel\"\ndensity = 7800\n", state(file)),
+            "the scene has no [[material]] of that name");
+    refused(scene("[material]\ndensity = 2500\n", state(file)), "of several materials");
+    refused(scene(glass + lead, state(file, "material = \"lead\"\n")), "leave `material = \"lead\"` out");
   }
 }
 

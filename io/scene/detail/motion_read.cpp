@@ -86,6 +86,7 @@ std::optional<double> time_of(const Scene& scene, StageRange stages) {
     const StageEnd& end = stage.end;
     if (end.by_state() || (end.steps && stage.chooses_time_step)) return std::nullopt;
     double time = end.time.value_or(std::numeric_limits<double>::infinity());
+    if (end.time && !stage.chooses_time_step) time = steps_in(time, stage.time_step) * stage.time_step;
     if (end.steps) time = std::min(time, static_cast<double>(*end.steps) * stage.time_step);
     sum += time;
   }

@@ -103,6 +103,7 @@ struct Simulation::Implementation {
     probes.go_on_from(head.probes);
     stage_index = static_cast<std::size_t>(head.stage_index);
     stage_begins = head.stage_begins;
+    std::ranges::copy(head.stress_at_start, setup.stress_at_start.begin());
     prescribe();
     parameters.time_step = head.time_step;
     clock = head.clock;
@@ -138,6 +139,7 @@ struct Simulation::Implementation {
     head.stage_index = static_cast<std::int64_t>(stage_index);
     head.stage_steps = stage_steps;
     head.stage_begins = stage_begins;
+    head.stress_at_start.assign(setup.stress_at_start.begin(), setup.stress_at_start.end());
     head.over = over;
     head.held = held;
     head.falls_in = falls_in;
@@ -321,9 +323,9 @@ struct Simulation::Implementation {
     if (stage_steps == 0) demand_grains_outside(stage(), next_step().text(), state, ranks);
     if (state.domain.flows) check_edges();
     if (state.domain.flows)
-      begin_flow(
-          drive_cell(setup, {stage_index, report.time - stage_begins[stage_index]}, parameters, state, ranks),
-          parameters.time_step, parameters.reflection, state.domain, state.flow);
+      begin_flow(drive_cell(setup, {stage_index, report.time - stage_begins[stage_index], stage_begins},
+                            parameters, state, ranks),
+                 parameters.time_step, parameters.reflection, state.domain, state.flow);
     demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
     prepare_walls(report.time, parameters.time_step, step_before(), state, ranks);
     apply_loads(parameters, next_step(), state);

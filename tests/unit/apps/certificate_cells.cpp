@@ -52,14 +52,20 @@ void each_step(const MadeScene& made, const Look& look) {
   graph::Executor executor({.threads = 1});
   Simulation simulation(made.scene.setup, bodies, executor);
   double stage_began = 0;
+  std::vector<double> stage_times;
   while (!simulation.finished()) {
     const Frame before = simulation.frame(false);
-    if (simulation.steps_of_stage() == 0) stage_began = before.time;
+    if (simulation.steps_of_stage() == 0) {
+      stage_times.resize(simulation.stage_index(), before.time - stage_began);
+      stage_began = before.time;
+    }
     const Stage stage = simulation.stage();
     const std::size_t index = simulation.stage_index();
     simulation.step();
-    look(rebuild_step({before, {}, {}, stage, bodies, made.scene.setup, index, before.time - stage_began}),
-         before, simulation.frame());
+    look(
+        rebuild_step(
+            {before, {}, {}, stage, bodies, made.scene.setup, index, before.time - stage_began, stage_times}),
+        before, simulation.frame());
     simulation.begin_next_stage();
   }
 }
@@ -166,6 +172,20 @@ TEST(CertificateCells, WhateverMovesThemTheProblemIsThatOfTheRun) {
       stage.shear_rates = {rate, -rate, rate};
     }));
   }
+}
+
+TEST(CertificateCells, ARampBeginsWhereTheStageBeforeWasCutOff) {
+  MadeScene made = cell_with(4, [](Stage& stage) {
+    stage.stress.to = {1e3, 1e3, 1e3, {}, {}, {}};
+    stage.stress.ramp_time = 50 * stage.time_step;
+  });
+  std::vector<Stage>& stages = made.scene.setup.stages;
+  stages.resize(1, stages.front());
+  stages.push_back(stages.front());
+  stages[0].end = stages[1].end = {};
+  stages[0].end.steps = stages[1].end.steps = 2;
+  stages[1].name = "again";
+  expect_the_problem_of_the_run(made);
 }
 
 TEST(CertificateCells, OfTheFamilyAreTheProblemsOfTheirRunsThroughoutWithRestitutionAndFriction) {

@@ -197,7 +197,7 @@ TEST(CertificateReference, WhereTheRunCarriesAGapOfRoundingIsNone) {
     Frame after = step.before;
     after.contact_bodies.push_back({0, 1});
     ASSERT_TRUE(step.problem().contacts.empty()) << gap;
-    const StepInput input{step.before, {}, {}, step.stage, step.bodies, step.setup, 0, 0, &after};
+    const StepInput input{step.before, {}, {}, step.stage, step.bodies, step.setup, 0, 0, {}, &after};
     EXPECT_EQ(rebuild_step(input).contacts.size(), gap < 1e-12 ? 1U : 0U) << gap;
   }
 }

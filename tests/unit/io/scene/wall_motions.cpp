@@ -148,6 +148,15 @@ TEST_F(WallMotions, TablesThatAreWrongAreRefusedByTheirLine) {
   refused("t,x,y,z\n0,0,0,0\n0.7,0,0,0\n", "the table ends at 0.7 s, and the stages of this motion last 1 s");
 }
 
+TEST_F(WallMotions, TakeWholeStepsToTheEndOfAStageAndSoMoreOfATable) {
+  table("t,x,y,z\n0,0,0,0\n1,0,0,0\n");
+  std::string text = scene_of(disc, "[[wall.motion]]\nkind = \"table\"\nfile = \"way.csv\"\n");
+  EXPECT_EQ(parse(text).setup.walls.size(), 1u);
+  const std::size_t step = text.find("time_step = ");
+  text.replace(step, text.find('\n', step) - step, "time_step = 1.1e-3");  // 0.5 s are 455 steps, 0.5005 s
+  expect_refused(text, "wall[0].motion[0].file", "the stages of this motion last 1.0005");
+}
+
 TEST_F(WallMotions, OfStagesThatMayEndSoonerAreNotHeldAgainstATable) {
   table("t,x,y,z\n0,0,0,0\n0.7,0,0,0\n");
   std::string text = scene_of(disc, "[[wall.motion]]\nkind = \"table\"\nfile = \"way.csv\"\n");

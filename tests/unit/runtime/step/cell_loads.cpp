@@ -27,7 +27,10 @@ TEST(StressAimedAt, ComesEvenlyFromWhatTheStageBeforeAimedAt) {
   second.to = {400, {}, 50, {}, {}, {}};
   second.ramp_time = 2;
   const talus::Setup setup = of_stages({first, second});
-  const auto at = [&](std::size_t stage, double time) { return stress_aimed_at(setup, {stage, time}); };
+  const std::vector<double> begins{0, 5};
+  const auto at = [&](std::size_t stage, double time) {
+    return stress_aimed_at(setup, {stage, time, begins});
+  };
   EXPECT_EQ(at(0, 0), (CellVelocity{100, 200, 0, 0, 0, 0})) << "at once";
   EXPECT_EQ(at(1, 0)[0], 100);
   EXPECT_EQ(at(1, 0.5)[0], 175);
@@ -35,6 +38,31 @@ TEST(StressAimedAt, ComesEvenlyFromWhatTheStageBeforeAimedAt) {
   EXPECT_EQ(at(1, 9)[0], 400);
   EXPECT_EQ(at(1, 9)[1], 0) << "it follows its rate now";
   EXPECT_EQ(at(1, 1)[2], 25) << "from 0, as the stage before prescribed the flow";
+}
+
+// A stage may end by what the grains do, long before its ramp is through.
+TEST(StressAimedAt, ComesFromWhereTheStageBeforeWasWhenItEnded) {
+  StressLoad first, second, third;
+  first.to = {100, 100, {}, {}, {}, {}};
+  first.amplitude[1] = 10;
+  first.period = 4;
+  second.to = {1100, {}, {}, {}, {}, {}};
+  third.to = {100, 0, {}, {}, {}, {}};
+  first.ramp_time = second.ramp_time = third.ramp_time = 10;
+  talus::Setup setup = of_stages({first, second, third});
+  setup.stress_at_start = {50, 0, 0, 0, 0, 0};
+  const std::vector<double> begins{0, 1, 3};  // s
+  const auto at = [&](std::size_t stage, double time) {
+    return stress_aimed_at(setup, {stage, time, begins});
+  };
+  EXPECT_DOUBLE_EQ(at(0, 0)[0], 50) << "from the stress of the sample";
+  EXPECT_DOUBLE_EQ(at(0, 1)[0], 55);
+  EXPECT_DOUBLE_EQ(at(0, 1)[1], 10 + 10) << "a quarter of its period";
+  EXPECT_DOUBLE_EQ(at(1, 0)[0], 55);
+  EXPECT_DOUBLE_EQ(at(1, 2)[0], 55 + 209);
+  EXPECT_DOUBLE_EQ(at(2, 0)[0], 264);
+  EXPECT_DOUBLE_EQ(at(2, 5)[0], 182) << "half way from there";
+  EXPECT_DOUBLE_EQ(at(2, 10)[0], 100);
 }
 
 TEST(StressAimedAt, SwingsAsASineOfTheTimeOfTheStage) {
