@@ -209,6 +209,24 @@ void add_jumps(const io::Scene& scene, std::vector<std::string>& warnings) {
     }
 }
 
+/// What a flow has pressed together is let go where a ramp begins at 0.
+void add_ramps_from_nothing(const io::Scene& scene, std::vector<std::string>& warnings) {
+  const std::vector<Stage>& stages = scene.setup.stages;
+  for (std::size_t s = 1; s < stages.size(); ++s) {
+    std::string axes;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (stages[s].stress.to[k] && stages[s].stress.ramp_time > 0 && !stages[s - 1].stress.to[k])
+        axes += std::string(axes.empty() ? "" : ", ") + "xyz"[k];
+    if (!axes.empty())
+      warnings.push_back(fmt::format(
+          "the stress of stage '{}' rises from 0 Pa along {}, as stage '{}' follows none there: grains that "
+          "are "
+          "pressed together are let go first. Put a stage of one step between them, with the stress that the "
+          "ramp shall begin from and no ramp_time",
+          stages[s].name, axes, stages[s - 1].name));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sample) {
@@ -220,6 +238,7 @@ std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sa
   add_segregation(scene, sample, warnings);
   add_idle_rolling(scene, sample, warnings);
   add_jumps(scene, warnings);
+  add_ramps_from_nothing(scene, warnings);
   add_friction(scene, warnings);
   add_still_belts(scene, warnings);
   if (const auto parts = static_cast<std::size_t>(scene.setup.decomposition.subdomains);

@@ -47,11 +47,11 @@ Section<StressLoad> stress_keys() {
                 "so that "
                 "a positive one shears towards negative rates.",
         [k](auto& load) -> auto& { return load.to[k]; }));
-  keys.push_back(
-      key<StressLoad>("ramp_time", "s", not_negative,
-                      "Time in which they come, evenly, from what the stage before aimed at, or from "
-                      "0 where it had no such stress.",
-                      &StressLoad::ramp_time));
+  keys.push_back(key<StressLoad>(
+      "ramp_time", "s", not_negative,
+      "Time in which they come, evenly, from what the stage before aimed at when it ended, in "
+      "the first stage from the stress that a state bears, or from 0 where there is neither.",
+      &StressLoad::ramp_time));
   for (std::size_t k = 0; k < swings.size(); ++k)
     keys.push_back(key<StressLoad>(
                        swings[k], "Pa", any, "Swings about it, as a sine of the stage's time.",

@@ -112,6 +112,22 @@ TEST_F(Warnings, OfATableThatJumpsOffTheMiddleOfAStep) {
   EXPECT_EQ(of(scene), "");
 }
 
+TEST_F(Warnings, OfAStressThatRisesFromNothingWhereAFlowPressedTheGrains) {
+  const std::string first =
+      "[[stage]]\nname = \"squeeze\"\nstrain_rates = [0, 0, -1]\n"
+      "stress = { xx = 1e3, yy = 1e3 }\nend = { steps = 2 }\n";
+  const auto second = [&](const std::string& stress) {
+    std::string scene = cell_scene;
+    scene.erase(scene.find("[[stage]]"));
+    return scene + first + "[[stage]]\nname = \"hold\"\nstress = { " + stress + " }\nend = { steps = 2 }\n";
+  };
+  EXPECT_NE(of(second("xx = 1e3, yy = 1e3, zz = 1e3, ramp_time = 0.1"))
+                .find("the stress of stage 'hold' rises from 0 Pa along z, as stage 'squeeze' follows none"),
+            std::string::npos);
+  EXPECT_EQ(of(second("xx = 1e3, yy = 1e3, zz = 1e3")), "") << "without a ramp it is given at once";
+  EXPECT_EQ(of(second("xx = 2e3, yy = 1e3, ramp_time = 0.1")), "") << "these were followed before";
+}
+
 TEST_F(Warnings, OfMoreSubdomainsThanGrains) {
   EXPECT_NE(of(column_scene + "\n[decomposition]\nsubdomains = 500\n").find("500 subdomains for"),
             std::string::npos);
