@@ -305,15 +305,16 @@ class Builder {
   }
 
   void meet_walls() {
-    for (std::size_t w = 0; w < in_.walls.size(); ++w) {
-      const StepWall wall(in_.walls[w], in_.before.time, numbers_.h);
-      if (!wall.there()) continue;
-      const Placement middle = wall.placed(numbers_.h / 2);
-      for (const BallAt& ball : balls_) meet_wall(wall, w, middle, ball);
+    for (const Wall& wall : in_.walls) {
+      walls_.emplace_back(wall, in_.before.time, numbers_.h);
+      placed_.push_back(walls_.back().placed(numbers_.h / 2));
     }
+    for (std::size_t w = 0; w < walls_.size(); ++w)
+      if (walls_[w].there())
+        for (const BallAt& ball : balls_) meet_wall(walls_[w], w, ball);
   }
 
-  void meet_wall(const StepWall& wall, std::size_t w, const Placement& middle, const BallAt& ball) {
+  void meet_wall(const StepWall& wall, std::size_t w, const BallAt& ball) {
     const std::size_t i = ball.body;
     const PairLaw& pair = law(material_[i], in_.walls[w].material);
     const Vec3 at = centre(ball);
@@ -325,7 +326,7 @@ class Builder {
     const double speed = (in_.before.u[i] - of_wall).norm() + speed_of_turn(ball) + gained.norm() +
                          wall.speed_near(at, ball.radius);
     for (const WallTouch& touch :
-         wall.touches(at, ball.radius + numbers_.alert + numbers_.h * speed, middle)) {
+         wall.touches(at, ball.radius + numbers_.alert + numbers_.h * speed, placed_[w])) {
       const Vec3 point = at - ball.radius * touch.normal;
       StepContact contact{i,
                           -1 - static_cast<std::ptrdiff_t>(w),
@@ -339,7 +340,8 @@ class Builder {
       const InRun carries = in_run(gap, i, -1 - static_cast<std::int64_t>(w));
       const double reach = held.reach * ball.radius;
       if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), carries}, pair.restitution, reach,
-                 contact.bias))
+                 contact.bias) ||
+          stands_on_another(walls_, placed_, w, at, ball.radius, touch))
         continue;
       if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, contact.drift.norm());
       // In a cell the material of a wall goes with the flow, in its plane.
@@ -351,6 +353,8 @@ class Builder {
   }
 
   const StepInput& in_;
+  std::vector<StepWall> walls_;
+  std::vector<Placement> placed_;  ///< in the middle of the step
   std::size_t n_;
   GapNumbers numbers_{};
   double acts_ = 0;  ///< StepProblem::time_step

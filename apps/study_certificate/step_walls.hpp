@@ -4,6 +4,7 @@
 /// planes, and how prescribed motions move them (docs/theory.md, "Walls"). Of kernels/shapes it takes the
 /// numbers of a scene, and the triangles that a mesh was read with; distances and velocities are its own.
 
+#include <span>
 #include <vector>
 
 #include "kernels/shapes/walls.hpp"
@@ -62,5 +63,10 @@ class StepWall {
   Twist rigid_, along_;              ///< of the wall, and of its surface against it
   std::vector<Triangle> triangles_;  ///< of a mesh, in its first place
 };
+
+/// Whether the point in which a sphere touches wall w belongs to another wall as well, which is nearer to the
+/// sphere: of two plates in a plane a sphere touches that on which it stands, up to the seam.
+bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
+                       const Vec3& centre, double radius, const WallTouch& touch);
 
 }  // namespace talus::audit

@@ -187,7 +187,7 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const GapResult<double> found =
         solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),
                   law.restitution, law.reach() * in.radius[i]);
-    if (found.absent) continue;
+    if (found.absent || at_seam(in.walls, at(chunks.wall[chunk]), in.x[i], in.radius[i], *point)) continue;
     contacts.bias[place] = found.bias;
     contacts.nx[place] = point->normal[0];
     contacts.ny[place] = point->normal[1];

@@ -35,6 +35,30 @@ void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<Sur
   for (std::size_t k = before; k < points.size(); ++k) points[k].normal = wall.pose.turned(points[k].normal);
 }
 
+bool at_seam(std::span<const Wall> walls, std::size_t index, const Vec3& centre, double radius,
+             const SurfacePoint& point) {
+  constexpr SeamThresholds limits;
+  const double on = limits.on * radius, nearer = point.distance - limits.nearer * radius;
+  // Seen from the side of the sphere, as surfaces may be touched from one side only.
+  const Vec3 before = centre - (point.distance - on) * point.normal;
+  std::vector<SurfacePoint> there;
+  for (std::size_t w = 0; w < walls.size(); ++w) {
+    const Wall& wall = walls[w];
+    if (w == index || wall.absent) continue;
+    if (wall.surface() == nullptr) {
+      if (std::abs(wall.normal.dot(before - wall.point)) <= 2 * on &&
+          wall.normal.dot(centre - wall.point) < nearer)
+        return true;
+      continue;
+    }
+    there.clear();
+    collide(wall, before, 2 * on, there);
+    for (const SurfacePoint& touched : there)
+      if (point_at(wall, centre, touched.feature).distance < nearer) return true;
+  }
+  return false;
+}
+
 void place(const Wall& first, const Pose& pose, Wall& wall) {
   if (wall.surface() != nullptr) {
     wall.pose = pose;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,18 @@ struct WallGroup {
 /// Surface::at and Surface::collide of a wall that has a surface, as it stands now, with a sphere in space.
 SurfacePoint point_at(const Wall& wall, const Vec3& centre, std::int32_t feature);
 void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<SurfacePoint>& points);
+
+/// The bounds within which a point lies on a wall, and by which another one comes nearer.
+struct SeamThresholds {
+  double on = 1e-9, nearer = 1e-12;  ///< of the sphere's radius
+};
+
+/// Whether the point in which a sphere touches the surface of wall `index` lies on another wall, too, that
+/// comes nearer to the sphere's centre: of two plates in one plane a sphere beside the seam touches the one
+/// that it stands on, and does not stumble over the edge of the other. The rule of the triangles of a mesh,
+/// for walls.
+bool at_seam(std::span<const Wall> walls, std::size_t index, const Vec3& centre, double radius,
+             const SurfacePoint& point);
 
 /// Brings a wall to a pose of `first`, the wall in its first place.
 void place(const Wall& first, const Pose& pose, Wall& wall);

@@ -77,7 +77,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
 }
 
 /// Whether a surface has, for this ball and in this step, the feature of the candidate: near an edge another
-/// feature may count instead (kernels/shapes/surface.hpp).
+/// feature, or another wall, may count instead (kernels/shapes/surface.hpp, at_seam).
 bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
   const Wall& wall = in.walls[at(pair.wall)];
   if (wall.surface() == nullptr) return true;
@@ -85,7 +85,9 @@ bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& mee
   std::vector<SurfacePoint> points;
   collide(wall, meeting.touch.ball.centre,
           meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(), points);
-  return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
+  const auto point = std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature);
+  return point != points.end() &&
+         !at_seam(in.walls, at(pair.wall), meeting.touch.ball.centre, meeting.touch.ball.radius, *point);
 }
 
 void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t place,

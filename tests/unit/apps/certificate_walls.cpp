@@ -173,6 +173,23 @@ TEST(CertificateWalls, ABallInAConeIsHeldByThreePointsOfACircle) {
   for (const Vec3& r : answer.exact) EXPECT_NEAR(r.norm(), each, 1e-6 * each);
 }
 
+TEST(CertificateWalls, AGrainBesideASeamOfTwoPlatesTouchesTheOneThatItStandsOn) {
+  const auto plate = [](double from) {
+    return wall_of("rectangle", {{"corner", {from, -1, 0}}, {"edge_a", {1, 0, 0}}, {"edge_b", {0, 2, 0}}});
+  };
+  for (const double x : {-0.03 * R, 0.03 * R}) {
+    GrainAtWall step({x, 0, R}, plate(-1), {0, 0, -g});
+    step.setup.walls.push_back(plate(0));
+    step.before.u = {{0, 1, 0}};  // along the seam
+    const std::vector<double> loads{0, 0};
+    const StepProblem problem =
+        rebuild_step({step.before, step.setup.walls, loads, step.stage, step.bodies, step.setup});
+    ASSERT_EQ(problem.contacts.size(), 1U) << x;
+    EXPECT_EQ(problem.contacts[0].second, x < 0 ? -1 : -2);
+    EXPECT_EQ(problem.contacts[0].normal, Vec3(Vec3::UnitZ()));
+  }
+}
+
 TEST(CertificateWalls, AGrainHangsFromACeilingThatHoldsIt) {
   for (const double share : {0.5, 2.0}) {
     Wall ceiling;

@@ -101,6 +101,72 @@ TEST(BallOnAMesh, FeelsNoEdgeBetweenTrianglesOfAPlane) {
   EXPECT_LT(std::abs(mesh.back()[2]), 1e-12);
 }
 
+/// A floor z = 0 (a tube's, along y = 0) of two walls that meet without a step at x = 0, or at x = 0 and 0.1.
+void floor_with_a_seam(const std::string& kind, Scene& scene) {
+  const auto plate = [&](double from, double to) {
+    scene.surface("rectangle",
+                  {{"corner", {from, -1, 0}}, {"edge_a", {to - from, 0, 0}}, {"edge_b", {0, 2, 0}}});
+  };
+  const auto tube = [&](double from, double to) {
+    scene.surface("cylinder",
+                  {{"start", {from, 0, 1}}, {"end", {to, 0, 1}}, {"radius", {1}}, {"inside", {1}}});
+  };
+  if (kind == "plates") plate(-1, 0), plate(0, 1);
+  if (kind == "plates, the other first") plate(0, 1), plate(-1, 0);
+  if (kind == "plates that overlap") plate(-1, 0.003), plate(-0.002, 1);
+  if (kind == "tubes") tube(-1, 0), tube(0, 1);
+  if (kind == "plate and mesh")
+    plate(-1, 0), scene.surface("mesh", {}, test::box_mesh({0, -1, -0.1}, {1, 1, 0}, 3));
+  if (kind == "disc in a plane")
+    scene.wall("floor", Vec3::Zero(), Vec3::UnitZ()),
+        scene.surface("disc", {{"centre", {0.05, 0, 0}}, {"axis", {0, 0, 1}}, {"radius", {0.05}}});
+}
+
+// A ball beside the seam stumbled over the edge of the wall that it had yet to reach: its nearest point is in
+// front of the ball, and no higher than the floor.
+TEST(BallOverASeam, FeelsNoEdgeBetweenWallsThatMeetInOnePlane) {
+  for (const std::string kind : {"plates", "plates, the other first", "plates that overlap", "tubes",
+                                 "plate and mesh", "disc in a plane"})
+    for (const bool clump : {false, true}) {
+      constexpr double r = 0.01;
+      Scene scene(h);
+      scene.stage().gravity = {0, 0, -g_earth};
+      scene.stage().laws.set_all(&PairLaw::restitution, 0.8);
+      floor_with_a_seam(kind, scene);
+      const Vec3 x(-0.05037, 0, r), u(1, 0, 0);
+      if (clump) {
+        const Ball one[] = {{Vec3::Zero(), r}};
+        scene.setup.clumps.push_back(make_clump(one).clump);
+        add_clump(scene.bodies, scene.setup.clumps, 1, BodyId{0},
+                  {x, {1, 0, 0, 0}, r, 2600, u, Vec3::Zero()});
+      } else {
+        scene.sphere(x, r, 4.0 / 3 * pi * r * r * r * 2600, u);
+      }
+      const double weight = 4.0 / 3 * pi * r * r * r * 2600 * g_earth;
+      Experiment run(std::move(scene));
+      for (int step = 0; step < 200; ++step) {
+        run.step();
+        const double carried = run.wall_force(0)[2] + run.wall_force(1)[2];
+        ASSERT_NEAR(carried, weight, 1e-6 * weight) << kind << (clump ? ", clump" : "") << ", step " << step;
+      }
+      EXPECT_LT((run.u() - u).norm(), 1e-9) << kind << (clump ? ", clump" : "");
+    }
+}
+
+// An edge that does stick out is one: a plate that begins higher by a tenth of the radius.
+TEST(BallOverASeam, StumblesOverAStep) {
+  constexpr double r = 0.01;
+  Scene scene(h);
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.surface("rectangle", {{"corner", {0, -1, 0.1 * r}}, {"edge_a", {1, 0, 0}}, {"edge_b", {0, 2, 0}}});
+  scene.sphere({-0.05, 0, r}, r, mass, {1, 0, 0});
+  Experiment run(std::move(scene));
+  run.steps(60);
+  EXPECT_LT(run.u()[0], 0.95);
+  EXPECT_GT(run.x()[2], 1.05 * r);
+}
+
 TEST(BallInAMeshCorner, IsHeldByItsFacesAndNotByTheirEdge) {
   Scene scene(h);
   scene.stage().gravity = {-g_earth, 0, -g_earth};
