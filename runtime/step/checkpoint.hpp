@@ -12,6 +12,7 @@
 
 #include "kernels/bodies/types.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/step/answer_memory.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/population.hpp"
@@ -155,6 +156,7 @@ struct CheckpointHead {
   double farthest = 0;
   StiffnessMemory stiffness;
   VelocityErrorMemory velocity_errors;
+  AnswerMemory answers;
 };
 
 /// visit(name, member) for each member of a head that is a number, a text, a Vec3, or a vector of numbers.
@@ -226,6 +228,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("farthest", head.farthest);
   StiffnessMemory::each_number(head.stiffness, visit);
   VelocityErrorMemory::each_number(head.velocity_errors, visit);
+  AnswerMemory::each_number(head.answers, visit);
 }
 
 struct Checkpoint {

@@ -19,6 +19,7 @@ void StepGraph::save(Checkpoint& to) const {
   head.farthest = loop_.problem().farthest();
   head.stiffness = loop_.problem().stiffness();
   head.velocity_errors = loop_.problem().velocity_errors();
+  head.answers = loop_.problem().answers();
   const std::vector<float>& pushes = loop_.positions().pushes();
   if (pushes.empty() || !state_.candidates_valid) return;
   for (std::size_t c = 0; c < state_.chunks.size(); ++c) {
@@ -57,7 +58,7 @@ void StepGraph::restore(const Checkpoint& from) {
     }
     if (any) loop_.positions().go_on_from(std::move(pushes));
   }
-  loop_.problem().go_on_from(head.stiffness, head.velocity_errors, head.farthest);
+  loop_.problem().go_on_from(head.stiffness, head.velocity_errors, head.answers, head.farthest);
 }
 
 }  // namespace talus

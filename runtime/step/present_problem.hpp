@@ -1,5 +1,6 @@
 #pragma once
 
+#include "runtime/step/answer_memory.hpp"
 #include "runtime/step/certificate.hpp"
 #include "runtime/step/courses.hpp"
 #include "runtime/step/global_solver.hpp"
@@ -25,7 +26,11 @@ class PresentProblem final : public WholeProblem {
   }
 
   /// The step has ended.
-  void end() { velocity_errors_.swept(certificate_.result().iterations); }
+  void end() {
+    const IterationResult& result = certificate_.result();
+    velocity_errors_.swept(result.iterations);
+    answers_.ended(result.unanswered && !result.converged);
+  }
 
   double plain_sweeps_needed() override;
   double speed() const override { return speed_of(courses_.now().plan); }
@@ -43,7 +48,7 @@ class PresentProblem final : public WholeProblem {
   }
   double large_work(double speed, double interest) override { return global_.large_work(speed, interest); }
   SmallError small_error(double enough, int sweeps) override {
-    return global_.small_error(enough, sweeps, farthest_);
+    return global_.small_error(enough, answers_.credited(sweeps), farthest_);
   }
   double large_error(double enough) override { return global_.large_error(enough); }
   VelocityErrorMemory& velocity_errors() override { return velocity_errors_; }
@@ -53,13 +58,15 @@ class PresentProblem final : public WholeProblem {
   bool grains_alike() const { return stiffness_.grains_alike(); }
   const StiffnessMemory& stiffness() const { return stiffness_; }
   const VelocityErrorMemory& velocity_errors() const { return velocity_errors_; }
+  const AnswerMemory& answers() const { return answers_; }
   /// As of the last plan() [m].
   double farthest() const { return farthest_; }
   /// What was learned of earlier problems; behind plan() where there is one.
   void go_on_from(const StiffnessMemory& stiffness, const VelocityErrorMemory& velocity_errors,
-                  double farthest) {
+                  const AnswerMemory& answers, double farthest) {
     stiffness_ = stiffness;
     velocity_errors_ = velocity_errors;
+    answers_ = answers;
     farthest_ = farthest;
   }
   double candidates() const { return candidates_; }  ///< of all ranks
@@ -75,6 +82,7 @@ class PresentProblem final : public WholeProblem {
   const Certificate& certificate_;
   StiffnessMemory stiffness_;
   VelocityErrorMemory velocity_errors_;
+  AnswerMemory answers_;
   bool clusters_known_ = false;  ///< of this step
   double candidates_ = 0;
   double farthest_ = 0;  ///< largest coordinate of a body [m]
