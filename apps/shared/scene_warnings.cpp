@@ -215,15 +215,15 @@ void add_ramps_from_nothing(const io::Scene& scene, std::vector<std::string>& wa
   for (std::size_t s = 1; s < stages.size(); ++s) {
     std::string axes;
     for (std::size_t k = 0; k < 3; ++k)
-      if (stages[s].stress.to[k] && stages[s].stress.ramp_time > 0 && !stages[s - 1].stress.to[k])
+      if (stages[s].stress.to[k].value_or(0) != 0 && stages[s].stress.ramp_time > 0 &&
+          !stages[s - 1].stress.to[k] && stages[s - 1].flows())
         axes += std::string(axes.empty() ? "" : ", ") + "xyz"[k];
     if (!axes.empty())
-      warnings.push_back(fmt::format(
-          "the stress of stage '{}' rises from 0 Pa along {}, as stage '{}' follows none there: grains that "
-          "are "
-          "pressed together are let go first. Put a stage of one step between them, with the stress that the "
-          "ramp shall begin from and no ramp_time",
-          stages[s].name, axes, stages[s - 1].name));
+      warnings.push_back(
+          fmt::format("the stress of stage '{}' rises from 0 Pa along {}, as stage '{}' follows none there: "
+                      "grains that are pressed together by then are let go first. Put a stage of one step "
+                      "between them, with the stress that the ramp shall begin from and no ramp_time",
+                      stages[s].name, axes, stages[s - 1].name));
   }
 }
 

@@ -155,17 +155,19 @@ double StepWall::overlap(const Vec3& centre, double radius, const Placement& whe
 
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch) {
-  const double small = 1e-9 * radius;
-  const Vec3 point = centre - (touch.distance - small) * touch.normal;
-  for (std::size_t other = 0; other < walls.size(); ++other) {
-    if (other == w || !walls[other].there()) continue;
-    bool has_point = false, nearer = false;
-    for (const WallTouch& here : walls[other].touches(point, 2 * small, placed[other]))
-      has_point |= here.distance > -2 * small;
-    for (const WallTouch& here : walls[other].touches(centre, touch.distance, placed[other]))
-      nearer |= here.distance < touch.distance - 1e-12 * radius;
-    if (has_point && nearer) return true;
-  }
+  const Vec3 point = centre - touch.distance * touch.normal;
+  const double step = 0.1 * radius, none = 1e-6 * radius;
+  const auto nearest = [&](std::size_t wall, double away) {
+    double least = INFINITY;
+    for (const WallTouch& here : walls[wall].touches(point + away * touch.normal, 2 * away, placed[wall]))
+      least = std::min(least, here.distance);
+    return least;
+  };
+  const double nearer = step * (1 - 1e-9);
+  for (std::size_t other = 0; other < walls.size(); ++other)
+    if (other != w && walls[other].there() && nearest(other, none) < 2 * none &&
+        nearest(other, step) < nearer)
+      return nearest(w, step) >= nearer;
   return false;
 }
 

@@ -64,8 +64,10 @@ class StepWall {
   std::vector<Triangle> triangles_;  ///< of a mesh, in its first place
 };
 
-/// Whether the point in which a sphere touches wall w belongs to another wall as well, which is nearer to the
-/// sphere: of two plates in a plane a sphere touches that on which it stands, up to the seam.
+/// Whether the point in which a sphere touches wall w belongs to another wall as well, or lies in it, which
+/// is nearer to the sphere there: of two plates in a plane a sphere touches that on which it stands, up to
+/// the seam. Not where w itself is nearer: of its circles the sphere touches three points, not the nearest
+/// alone.
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch);
 

@@ -38,24 +38,24 @@ void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<Sur
 bool at_seam(std::span<const Wall> walls, std::size_t index, const Vec3& centre, double radius,
              const SurfacePoint& point) {
   constexpr SeamThresholds limits;
-  const double on = limits.on * radius, nearer = point.distance - limits.nearer * radius;
+  std::vector<SurfacePoint> found;
+  const auto reaches = [&](const Wall& wall, const Vec3& from, double reach) {
+    if (wall.surface() == nullptr) return wall.normal.dot(from - wall.point) < reach;
+    if (!wall.surface()->bounds().near(wall.pose.back(from), reach)) return false;
+    found.clear();
+    collide(wall, from, reach, found);
+    return !found.empty();
+  };
   // Seen from the side of the sphere, as surfaces may be touched from one side only.
-  const Vec3 before = centre - (point.distance - on) * point.normal;
-  std::vector<SurfacePoint> there;
-  for (std::size_t w = 0; w < walls.size(); ++w) {
-    const Wall& wall = walls[w];
-    if (w == index || wall.absent) continue;
-    if (wall.surface() == nullptr) {
-      if (std::abs(wall.normal.dot(before - wall.point)) <= 2 * on &&
-          wall.normal.dot(centre - wall.point) < nearer)
-        return true;
-      continue;
-    }
-    there.clear();
-    collide(wall, before, 2 * on, there);
-    for (const SurfacePoint& touched : there)
-      if (point_at(wall, centre, touched.feature).distance < nearer) return true;
-  }
+  const double on = limits.on * radius, look = limits.look * radius;
+  const Vec3 touched = centre - point.distance * point.normal;
+  const auto comes_nearer = [&](const Wall& wall) {
+    return reaches(wall, touched + look * point.normal, look * (1 - limits.nearer));
+  };
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    if (w != index && !walls[w].absent && reaches(walls[w], touched + on * point.normal, 2 * on) &&
+        comes_nearer(walls[w]))
+      return !comes_nearer(walls[index]);
   return false;
 }
 

@@ -93,15 +93,21 @@ struct WallGroup {
 SurfacePoint point_at(const Wall& wall, const Vec3& centre, std::int32_t feature);
 void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<SurfacePoint>& points);
 
-/// The bounds within which a point lies on a wall, and by which another one comes nearer.
+/// Parts of a sphere's radius, in (0, 1).
 struct SeamThresholds {
-  double on = 1e-9, nearer = 1e-12;  ///< of the sphere's radius
+  /// A point lies on a wall that is no further away: more than files in single precision round by.
+  double on = 1e-6;
+  /// Whether a wall comes nearer is asked of a place so far in front of the point: further away another part
+  /// of the wall may be near.
+  double look = 0.1;
+  /// Nearer by less is as near: distances as long as a thousand radii are rounded by as much, of `look`.
+  double nearer = 1e-9;
 };
 
-/// Whether the point in which a sphere touches the surface of wall `index` lies on another wall, too, that
-/// comes nearer to the sphere's centre: of two plates in one plane a sphere beside the seam touches the one
-/// that it stands on, and does not stumble over the edge of the other. The rule of the triangles of a mesh,
-/// for walls.
+/// Whether the point in which a sphere touches the surface of wall `index` lies on or in another wall, too,
+/// that comes nearer to the sphere beside it: of two plates in one plane a sphere beside the seam touches the
+/// one that it stands on, and does not stumble over the edge of the other. False for points that are not the
+/// nearest of their own wall, as two of the three of a circle.
 bool at_seam(std::span<const Wall> walls, std::size_t index, const Vec3& centre, double radius,
              const SurfacePoint& point);
 

@@ -168,6 +168,7 @@ StepState restore_state(const Setup& setup, const Checkpoint& from, const graph:
   state.decomposition = make_decomposition(with_subdomains(setup.decomposition, head.subdomains), ranks);
   Decomposition& all = state.decomposition;
   demand(from.parts.size() == all.here.size(), "subdomains");
+  demand(head.stage_begins.size() == static_cast<std::size_t>(head.stage_index) + 1, "stages");
   demand(head.stress_at_start.size() == cell_freedoms, "the stress of its sample");
   restore_partition(head, all);
   state.walls = setup.walls;

@@ -50,7 +50,7 @@ Section<StressLoad> stress_keys() {
   keys.push_back(key<StressLoad>(
       "ramp_time", "s", not_negative,
       "Time in which they come, evenly, from what the stage before aimed at when it ended, in "
-      "the first stage from the stress that a state bears, or from 0 where there is neither.",
+      "the first stage from the stress that the contacts of a state bear, or from 0 where there is neither.",
       &StressLoad::ramp_time));
   for (std::size_t k = 0; k < swings.size(); ++k)
     keys.push_back(key<StressLoad>(

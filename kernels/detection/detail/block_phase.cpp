@@ -77,7 +77,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
 }
 
 /// Whether a surface has, for this ball and in this step, the feature of the candidate: near an edge another
-/// feature, or another wall, may count instead (kernels/shapes/surface.hpp, at_seam).
+/// feature may count instead (kernels/shapes/surface.hpp).
 bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
   const Wall& wall = in.walls[at(pair.wall)];
   if (wall.surface() == nullptr) return true;
@@ -85,9 +85,14 @@ bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& mee
   std::vector<SurfacePoint> points;
   collide(wall, meeting.touch.ball.centre,
           meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(), points);
-  const auto point = std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature);
-  return point != points.end() &&
-         !at_seam(in.walls, at(pair.wall), meeting.touch.ball.centre, meeting.touch.ball.radius, *point);
+  return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
+}
+
+/// at_seam, of a ball.
+bool touches_another(const NarrowPhase& in, const WallPair& pair, const Touch& touch) {
+  if (in.walls[at(pair.wall)].surface() == nullptr) return false;
+  return at_seam(in.walls, at(pair.wall), touch.ball.centre, touch.ball.radius,
+                 {pair.feature, touch.gap + touch.ball.radius, touch.normal});
 }
 
 void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t place,
@@ -131,7 +136,8 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     const GapResult<double> found =
         solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall), law.restitution,
                   law.reach() * meeting.touch.smaller_radius);
-    if (found.absent) continue;
+    if (found.absent || (wall && touches_another(in, candidates.wall_pairs[k - grains], meeting.touch)))
+      continue;
     if (wall && !contacts.vx.empty())
       set_drift(contacts, place,
                 in.walls[at(chunks.wall[chunk])].drift_at(meeting.touch.point, meeting.touch.normal));

@@ -186,7 +186,7 @@ TEST(CertificateWalls, AGrainBesideASeamOfTwoPlatesTouchesTheOneThatItStandsOn) 
         rebuild_step({step.before, step.setup.walls, loads, step.stage, step.bodies, step.setup});
     ASSERT_EQ(problem.contacts.size(), 1U) << x;
     EXPECT_EQ(problem.contacts[0].second, x < 0 ? -1 : -2);
-    EXPECT_EQ(problem.contacts[0].normal, Vec3(Vec3::UnitZ()));
+    EXPECT_LT((problem.contacts[0].normal - Vec3::UnitZ()).norm(), 1e-12);
   }
 }
 
