@@ -161,8 +161,9 @@ TEST(BallOverASeam, FeelsNoEdgeBetweenWallsThatMeetInOnePlane) {
       }
       EXPECT_LT((run.u() - u).norm(), 1e-6) << kind << (clump ? ", clump" : "");
       // On the disc both are touched, and who carries is open.
-      if (kind != "disc in a plane")
+      if (kind != "disc in a plane") {
         EXPECT_GT(std::min(first, second), 0.1 * weight) << kind << ": both bear it in their turn";
+      }
     }
 }
 
