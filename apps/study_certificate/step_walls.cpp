@@ -155,6 +155,7 @@ double StepWall::overlap(const Vec3& centre, double radius, const Placement& whe
 
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch) {
+  if (walls[w].plane()) return false;
   const Vec3 point = centre - touch.distance * touch.normal;
   const double step = 0.1 * radius, none = 1e-6 * radius;
   const auto nearest = [&](std::size_t wall, double away) {

@@ -39,6 +39,7 @@ class StepWall {
 
   /// The wall is in this stage.
   bool there() const { return !wall_.absent; }
+  bool plane() const { return wall_.surface() == nullptr; }
   /// A prescribed motion moves it, or its surface.
   bool moves() const { return !wall_.motion.empty(); }
   /// From its first place to where it stands `later` [s]; of a wall that a load moves, at the speed that it
@@ -64,10 +65,10 @@ class StepWall {
   std::vector<Triangle> triangles_;  ///< of a mesh, in its first place
 };
 
-/// Whether the point in which a sphere touches wall w belongs to another wall as well, or lies in it, which
-/// is nearer to the sphere there: of two plates in a plane a sphere touches that on which it stands, up to
-/// the seam. Not where w itself is nearer: of its circles the sphere touches three points, not the nearest
-/// alone.
+/// Of a wall w that is no plane, whether the point in which a sphere touches it belongs to another wall as
+/// well, or lies in it, which is nearer to the sphere there: of two plates in a plane a sphere touches that
+/// on which it stands, up to the seam. Not where w itself is nearer: of its circles the sphere touches three
+/// points, not the nearest alone.
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch);
 
