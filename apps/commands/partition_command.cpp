@@ -11,7 +11,7 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
-#include "apps/shared/sample_builder.hpp"
+#include "apps/shared/placed_sample.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/pictures/picture.hpp"
 #include "io/results/vtk.hpp"
@@ -175,8 +175,7 @@ int partition_command(const PartitionCommandOptions& options) {
   try {
     kinds = kinds_of(options.partitioners);
     scene = io::load_scene(options.scene, options.overrides);
-    const Sample sample = build_sample(scene);
-    io::place_walls(scene, sample);
+    const Sample sample = place_sample(scene).sample;
     append(sample, bodies);
     if (directory.empty()) directory = "out/partition-" + scene.name;
     check_boxes(scene.setup.decomposition, options.subdomains, kinds);

@@ -9,7 +9,7 @@
 #include "apps/commands/threads.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
-#include "apps/shared/sample_builder.hpp"
+#include "apps/shared/placed_sample.hpp"
 #include "io/scene/scene.hpp"
 #include "runtime/step/simulation.hpp"
 
@@ -126,9 +126,7 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
   Bodies bodies;
   try {
     scene = io::load_scene(options.scene, options.overrides);
-    const Sample sample = build_sample(scene);
-    io::place_walls(scene, sample);
-    append(sample, bodies);
+    append(place_sample(scene).sample, bodies);
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

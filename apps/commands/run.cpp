@@ -25,11 +25,11 @@
 #include "apps/commands/threads.hpp"
 #include "apps/report/run_report.hpp"
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/placed_sample.hpp"
 #include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/scene_warnings.hpp"
 #include "apps/shared/signals.hpp"
-#include "apps/shared/state_sample.hpp"
 #include "apps/shared/trace_feed.hpp"
 #include "io/files/crc.hpp"
 #include "io/files/error.hpp"
@@ -105,21 +105,6 @@ void read_recordings(const RunOptions& options, const graph::Communicator& ranks
   if (!options.task_times.empty())
     run.recordings.times =
         std::make_unique<trace::TaskTimes>(io::read_trace(options.task_times), ranks.ranks(), ranks.rank());
-}
-
-/// The sample, on rank 0, and the walls that are placed by it.
-void place_sample(Prepared& run) {
-  if (run.scene.from_state()) {
-    StateSample state = read_state(run.scene);
-    run.sample = build_sample(run.scene, std::move(state.sample));
-    run.forces = std::move(state.forces);
-    place_walls_of(state.walls, run.scene);
-    run.warnings = warnings_of_surfaces(state.walls, run.scene);
-  } else {
-    run.sample = build_sample(run.scene);
-  }
-  io::place_walls(run.scene, run.sample);
-  run.scene.setup.stress_at_start = stress_at_start(run.sample, run.forces, run.scene.setup);
 }
 
 /// Where the run goes on, if it does. Collective, but for what it throws.
@@ -220,7 +205,10 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
       run.input_files.push_back({file, io::crc_of_file(file)});
     demand_memory_of_graph(run.scene, ranks.ranks());
     if (run.point) return;
-    place_sample(run);
+    PlacedSample placed_sample = place_sample(run.scene);
+    run.sample = std::move(placed_sample.sample);
+    run.forces = std::move(placed_sample.forces);
+    run.warnings = std::move(placed_sample.warnings);
     // scene.resolved.toml says where the walls stood
     if (options.resume && std::filesystem::is_directory(run.directory))
       demand_results_of_scene(run.directory, run.scene, run.nothing_left.has_value());

@@ -15,7 +15,7 @@
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
 #include "apps/shared/print.hpp"
-#include "apps/shared/sample_builder.hpp"
+#include "apps/shared/placed_sample.hpp"
 #include "apps/shared/say.hpp"
 #include "apps/shared/signals.hpp"
 #include "apps/study_certificate/calibration.hpp"
@@ -169,14 +169,15 @@ void audit_given(const StudyCertificateOptions& options, const std::vector<io::S
   const AuditPlan plan{options.steps > 0 ? options.steps : std::numeric_limits<std::int64_t>::max(), {}};
   for (const io::Scene& scene : scenes) {
     if (stop_signal() != 0) return;
+    io::Scene placed = scene;
     Sample grains;
     try {
-      grains = build_sample(scene);
+      grains = place_sample(placed).sample;
     } catch (const std::exception&) {
       if (stop_signal() != 0) return;  // which cuts a deposition short
       throw;
     }
-    progress.audit(scene, scene.name, grains, plan);
+    progress.audit(placed, scene.name, grains, plan);
   }
 }
 

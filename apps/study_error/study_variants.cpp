@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "apps/shared/sample_builder.hpp"
+#include "apps/shared/placed_sample.hpp"
 
 namespace talus {
 
@@ -14,9 +14,7 @@ StudySample study_sample(const std::string& path, const std::vector<std::string>
   std::vector<std::string> all = overrides;
   all.push_back(fmt::format("seed={}", seed));
   StudySample sample{io::load_scene(path, all), {}};
-  const Sample grains = build_sample(sample.scene);
-  io::place_walls(sample.scene, grains);
-  append(grains, sample.bodies);
+  append(place_sample(sample.scene).sample, sample.bodies);
   return sample;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "apps/shared/placed_sample.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/results/results.hpp"
@@ -90,7 +91,7 @@ ScalingSample scaling_sample(const std::string& path, const std::vector<std::str
                              const std::string& from, const std::string& stage) {
   io::Scene scene = io::load_scene(path, overrides);
   if (from.empty()) {
-    Sample grains = build_sample(scene);
+    Sample grains = place_sample(scene).sample;
     return finished(std::move(scene), std::move(grains), stage);
   }
   const std::size_t frames = io::frame_count(from);
