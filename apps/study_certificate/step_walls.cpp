@@ -165,9 +165,14 @@ bool stands_on_another(std::span<const StepWall> walls, std::span<const Placemen
     return least;
   };
   const double nearer = step * (1 - 1e-9);
+  // A wall that leaves the other behind does not hold the sphere in its place.
+  const auto leaves = [&](std::size_t wall) {
+    const Vec3 of_wall = walls[wall].velocity_at(point), of_w = walls[w].velocity_at(point);
+    return (of_wall - of_w).dot(touch.normal) < -1e-9 * (of_wall.norm() + of_w.norm());
+  };
   for (std::size_t other = 0; other < walls.size(); ++other)
     if (other != w && walls[other].there() && nearest(other, none) < 2 * none &&
-        nearest(other, step) < nearer)
+        nearest(other, step) < nearer && !leaves(other))
       return nearest(w, step) >= nearer;
   return false;
 }

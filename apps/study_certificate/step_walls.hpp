@@ -51,6 +51,8 @@ class StepWall {
   /// carries it from the middle of the step to that of the next, and that of its surface, along it. 0 for a
   /// wall that a load moves: its velocity is in Motion::walls.
   Vec3 material_velocity(const Vec3& point, const Vec3& normal) const;
+  /// Of the wall itself at a point, its surface apart; of one that a load moves before the step [m/s].
+  Vec3 velocity_at(const Vec3& point) const { return moves() ? rigid_.at(point) : wall_.velocity; }
   /// Angular velocity of its material [rad/s].
   Vec3 spin() const { return moves() ? Vec3(rigid_.omega + along_.omega) : Vec3(Vec3::Zero()); }
   /// The largest speed of its material in a sphere, or more [m/s].

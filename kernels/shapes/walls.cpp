@@ -52,9 +52,15 @@ bool at_seam(std::span<const Wall> walls, std::size_t index, const Vec3& centre,
   const auto comes_nearer = [&](const Wall& wall) {
     return reaches(wall, touched + look * point.normal, look * (1 - limits.nearer));
   };
+  // What gives way along the normal does not carry in this step what the other one would.
+  const Vec3 own = walls[index].velocity_at(touched);
+  const auto gives_way = [&](const Wall& wall) {
+    const Vec3 velocity = wall.velocity_at(touched);
+    return point.normal.dot(velocity - own) < -limits.still * (velocity.norm() + own.norm());
+  };
   for (std::size_t w = 0; w < walls.size(); ++w)
     if (w != index && !walls[w].absent && reaches(walls[w], touched + on * point.normal, 2 * on) &&
-        comes_nearer(walls[w]))
+        comes_nearer(walls[w]) && !gives_way(walls[w]))
       return !comes_nearer(walls[index]);
   return false;
 }

@@ -102,12 +102,15 @@ struct SeamThresholds {
   double look = 0.1;
   /// Nearer by less is as near: distances as long as a thousand radii are rounded by as much, of `look`.
   double nearer = 1e-9;
+  /// Of two walls that move alike velocities differ by less than this part of them.
+  double still = 1e-9;
 };
 
 /// Whether the point in which a sphere touches the surface of wall `index` lies on or in another wall, too,
 /// that comes nearer to the sphere beside it: of two plates in one plane a sphere beside the seam touches the
-/// one that it stands on, and does not stumble over the edge of the other. False for points that are not the
-/// nearest of their own wall, as two of the three of a circle.
+/// one that it stands on, and does not stumble over the edge of the other. False where the other wall gives
+/// way to the sphere, compared with this one, and for points that are not the nearest of their own wall, as
+/// two of the three of a circle.
 bool at_seam(std::span<const Wall> walls, std::size_t index, const Vec3& centre, double radius,
              const SurfacePoint& point);
 

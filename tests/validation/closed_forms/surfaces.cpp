@@ -205,6 +205,29 @@ TEST(BallInAnOutlet, IsHeldByTheRingWhereConeAndTubeMeet) {
   }
 }
 
+// At the middle of the step a trap door is as high as the floor, to rounding, but it falls faster than the
+// ball.
+TEST(BallOnATrapDoor, IsHeldByTheFloorThatTheDoorLeaves) {
+  constexpr double r = 0.01, speed = 0.4;
+  for (const double above : {0.0, 1e-7 * r, -1e-7 * r}) {
+    Scene scene(h);
+    scene.stage().gravity = {0, 0, -g_earth};
+    const auto plate = [&](double z) {
+      scene.surface("rectangle", {{"corner", {-1, -1, z}}, {"edge_a", {2, 0, 0}}, {"edge_b", {0, 2, 0}}});
+    };
+    plate(0);
+    plate(above + 0.5 * h);
+    MotionPart falling;
+    falling.velocity = {0, 0, -1};
+    scene.setup.walls.back().motion = {falling};
+    scene.sphere({0, 0, r + 0.5 * h * speed}, r, mass, {0, 0, -speed});
+    Experiment run(std::move(scene));
+    run.step();
+    EXPECT_NEAR(run.u()[2], 0, 1e-6) << above;
+    EXPECT_NEAR(run.wall_force(0)[2], mass * (speed / h + g_earth), 1e-3 * mass * speed / h) << above;
+  }
+}
+
 // A plate that rises out of the floor keeps its edge: what lies higher is nearer.
 TEST(BallBesideAFlap, IsPushedByItsEdgeAsItRises) {
   constexpr double r = 0.01;
