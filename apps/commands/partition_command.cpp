@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "apps/shared/exit_codes.hpp"
-#include "apps/shared/print.hpp"
 #include "apps/shared/placed_sample.hpp"
+#include "apps/shared/print.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/pictures/picture.hpp"
 #include "io/results/vtk.hpp"

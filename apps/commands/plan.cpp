@@ -8,8 +8,8 @@
 #include "apps/commands/plan_measure.hpp"
 #include "apps/commands/threads.hpp"
 #include "apps/shared/exit_codes.hpp"
-#include "apps/shared/print.hpp"
 #include "apps/shared/placed_sample.hpp"
+#include "apps/shared/print.hpp"
 #include "io/scene/scene.hpp"
 #include "runtime/step/simulation.hpp"
 

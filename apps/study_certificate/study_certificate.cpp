@@ -14,8 +14,8 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
-#include "apps/shared/print.hpp"
 #include "apps/shared/placed_sample.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/say.hpp"
 #include "apps/shared/signals.hpp"
 #include "apps/study_certificate/calibration.hpp"
