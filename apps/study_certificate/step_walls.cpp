@@ -153,22 +153,34 @@ double StepWall::overlap(const Vec3& centre, double radius, const Placement& whe
   return deepest;
 }
 
+namespace {
+
+/// Where two walls count as one at a place, as parts of the sphere's radius.
+struct Seam {
+  double none = 1e-6;   ///< a distance that counts as none
+  double step = 0.1;    ///< so far before the place it is asked who is nearer
+  double equal = 1e-9;  ///< distances there, and velocities, that differ by less are equal
+};
+
+}  // namespace
+
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch) {
   if (walls[w].plane()) return false;
   const Vec3 point = centre - touch.distance * touch.normal;
-  const double step = 0.1 * radius, none = 1e-6 * radius;
+  constexpr Seam seam;
+  const double step = seam.step * radius, none = seam.none * radius;
   const auto nearest = [&](std::size_t wall, double away) {
     double least = INFINITY;
     for (const WallTouch& here : walls[wall].touches(point + away * touch.normal, 2 * away, placed[wall]))
       least = std::min(least, here.distance);
     return least;
   };
-  const double nearer = step * (1 - 1e-9);
+  const double nearer = step * (1 - seam.equal);
   // A wall that leaves the other behind does not hold the sphere in its place.
   const auto leaves = [&](std::size_t wall) {
     const Vec3 of_wall = walls[wall].velocity_at(point), of_w = walls[w].velocity_at(point);
-    return (of_wall - of_w).dot(touch.normal) < -1e-9 * (of_wall.norm() + of_w.norm());
+    return (of_wall - of_w).dot(touch.normal) < -seam.equal * (of_wall.norm() + of_w.norm());
   };
   for (std::size_t other = 0; other < walls.size(); ++other)
     if (other != w && walls[other].there() && nearest(other, none) < 2 * none &&

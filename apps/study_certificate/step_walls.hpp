@@ -69,8 +69,8 @@ class StepWall {
 
 /// Of a wall w that is no plane, whether the point in which a sphere touches it belongs to another wall as
 /// well, or lies in it, which is nearer to the sphere there: of two plates in a plane a sphere touches that
-/// on which it stands, up to the seam. Not where w itself is nearer: of its circles the sphere touches three
-/// points, not the nearest alone.
+/// on which it stands, up to the seam. Not where that wall leaves w behind, nor where w itself is nearer: of
+/// its circles the sphere touches three points, not the nearest alone.
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch);
 

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 
 #include "apps/study_error/study_variants.hpp"
 #include "io/results/results.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
 
 namespace talus {
 namespace {
@@ -14,10 +14,7 @@ namespace {
 // Two grains of a cell that press one another along x by 3 N over a branch of 0.02 m, in 0.1 m x 0.1 m x 0.1
 // m: studies and runs begin from 60 Pa.
 TEST(PlacedSample, OfAStateBringsTheStressOfItsContactsAlongForStudiesToo) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() /
-      ("talus_placed_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()));
-  std::filesystem::create_directories(folder);
+  const test::ScratchDirectory folder;
   Frame frame;
   frame.domain = periodic_domain({0.1, 0.1, 0.1});
   frame.id = {0, 1};
@@ -52,7 +49,6 @@ end = { steps = 1 }
   EXPECT_EQ(scene.setup.stress_at_start[1], 0);
   EXPECT_EQ(study_sample((folder / "scene.toml").string(), {}, 1).scene.setup.stress_at_start,
             scene.setup.stress_at_start);
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
