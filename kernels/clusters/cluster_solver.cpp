@@ -170,6 +170,15 @@ bool velocities_suffice(const BodyProblem& problem, ClusterGoal goal, const Clus
   return true;
 }
 
+/// Rounds may not settle, as contacts close on bodies and part by the last bit of their velocities.
+bool lost_in_rounding(const BodyProblem& problem, const Correction& rounds, const ClusterGoal& goal,
+                      const ClusterThresholds& thresholds) {
+  double mass = 0;
+  for (const BodyUnknown& body : problem.bodies) mass += body.mass;
+  return larger(rounds.at_first, rounds.error()) <= thresholds.rounding * mass * goal.still &&
+         mass_ratio(problem) <= thresholds.rounding_apart;
+}
+
 /// What follows where rounds have not settled. `answer`: theirs, in; the best, out.
 void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThresholds& thresholds,
             ClusterAnswer& answer) {
@@ -223,6 +232,7 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
   const Correction rounds = correction_of(problem, goal.enough, thresholds.correction);
   answer = answer_of(problem, problem, rounds);
   const std::vector<Vec3> found = answer.found;
+  answer.solved = answer.solved || lost_in_rounding(problem, rounds, goal, thresholds);
   if (!answer.solved) search(problem, goal, thresholds, answer);
   const bool estimate = has_rolling(problem) && !(answer.solved && answer.knows_moments);
   admit(problem, goal, thresholds, answer);

@@ -36,6 +36,11 @@ struct ClusterThresholds {
   /// Without friction velocities are compared in the kinetic norm, too, in which light bodies count beside
   /// heavy ones, with what contacts exchange there, at least `pressed`, in (0, 1), of the largest impulse.
   double same_velocities = 0.1, same_law = 1e-3, pressed = 1e-2;
+  /// Where all that the law and the rounds find wrong is less than this part, in (0, 1), of what rounding of
+  /// positions makes of the bodies' momentum (ClusterGoal::still), the impulses are an answer: grains that
+  /// fly along walls, and close on them or part by the last bit. Not where all bodies together are more than
+  /// so many effective masses of a contact, > 1.
+  double rounding = 0.1, rounding_apart = 100;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.
   struct Handover {
@@ -60,15 +65,16 @@ struct ClusterAnswer {
   bool jammed = false;         ///< there is none: none_admissible
 };
 
-/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, and there may be an
-/// answer (admissible.hpp), proximal steps, with friction first those of coulomb_newton.hpp, then
-/// proximal_newton.hpp, which without friction ask first for the velocities alone, and end where these are
-/// those of impulses that meet the law; and where these do not either, with what is left of the budget the
-/// solvers that keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again
-/// from there; not where steps of all kinds were stuck (Correction::stuck). All but the rounds take moments
-/// of rolling resistance as given: beside their answers what the rounds would change counts as error, if it
-/// is more, an estimate. All by counted work, so the same bits come out every time. The changed impulses lie
-/// on the cones. Values that are not finite come back as an error that is not.
+/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, but find no more
+/// wrong than rounding of positions, the impulses stay; else, where there may be an answer (admissible.hpp),
+/// proximal steps, with friction first those of coulomb_newton.hpp, then proximal_newton.hpp, which without
+/// friction ask first for the velocities alone, and end where these are those of impulses that meet the law;
+/// and where these do not either, with what is left of the budget the solvers that keep W
+/// (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there; not where
+/// steps of all kinds were stuck (Correction::stuck). All but the rounds take moments of rolling resistance
+/// as given: beside their answers what the rounds would change counts as error, if it is more, an estimate.
+/// All by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values
+/// that are not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

@@ -67,5 +67,35 @@ TEST(ClusterSolver, FindsWhoCarriesWhereAllButTheSameVelocitiesMeetTheLawButForR
   EXPECT_GE(solved, 24);
 }
 
+/// A grain of 1 kg that flies along two walls at 0.4 m/s, with friction, closes on one by `first` and on the
+/// other by `second` [m/s], and is impulse-free.
+BodyProblem along_walls(double first, double second) {
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0.4);
+  problem.bodies[0].free.u = Vec3(-first, -second, 0.4);
+  add_contact(problem, grain, -1, Vec3::UnitX(), 0.4, 0);
+  add_contact(problem, grain, -1, Vec3(0.6, 0.8, 0), 0.4, 1);
+  return problem;
+}
+
+TEST(ClusterSolver, LeavesGrainsAloneThatCloseOnWallsByLessThanRoundingOfPositions) {
+  const double still = 1e-15;  // [m/s]
+  for (const double first : {1e-18, -1e-18, 0.0, 3e-17})
+    for (const double second : {1e-18, -1e-18, 2e-18, -3e-17}) {
+      const ClusterAnswer answer = solve_cluster(
+          along_walls(first, second), {.enough = 1e-15, .relative = 1e-2, .sweeps = 10, .still = still});
+      EXPECT_TRUE(answer.solved) << first << ' ' << second;
+      EXPECT_LE(answer.error, 0.1 * still) << first << ' ' << second;  // of 1 kg
+    }
+}
+
+TEST(ClusterSolver, StopsGrainsThatCloseOnWallsFasterThanRounding) {
+  const BodyProblem problem = along_walls(1e-3, 1e-3);
+  const ClusterAnswer answer =
+      solve_cluster(problem, {.enough = 1e-8, .relative = 1e-2, .sweeps = 100, .still = 1e-15});
+  ASSERT_TRUE(answer.solved);
+  EXPECT_GE((problem.bodies[0].free.u + answer.motion[0].u).x(), -1e-8);
+}
+
 }  // namespace
 }  // namespace talus::cluster_solver_test
