@@ -112,7 +112,8 @@ void measure_group(const Everywhere& everywhere, const ErrorGoal& goal, const St
   const Measures row = measures_of(own.group.problem, goal.faces);
   const double share = everywhere.mass > 0 ? row[mass] / everywhere.mass : 0;
   // What rounding makes must pass whatever is asked.
-  const double still = row[mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
+  const double still = thresholds.still * row[mass] * goal.still /
+                       std::max(goal.enough, std::numeric_limits<double>::epsilon());
   own.floor = thresholds.elsewhere * everywhere.scale * share;
   own.scale = std::max({scale_of(row, thresholds), own.floor, still});
   own.noise = std::max(thresholds.rounding * most_momentum(row[mass], row[incoming]), still);

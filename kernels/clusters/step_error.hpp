@@ -33,6 +33,10 @@ struct StepErrorThresholds {
   int most_rounds = 4;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = BalanceThresholds{}.rounding;
+  /// Of the momentum that rounding of positions makes of a cluster (ErrorGoal::still), in (0, 1]: what need
+  /// not be told apart is this part of it at least. What a step may be wrong by is a few times that, and
+  /// whoever compares velocities to rounding of positions has as much of his own.
+  double still = 0.4;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
   /// nothing of what they have not.
   double unknown = 1;
