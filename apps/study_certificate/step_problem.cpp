@@ -208,14 +208,15 @@ class Builder {
     const StepCell& cell = made_.cell;
     const Vec3 apart = centre(one) - centre(other), k = cell.edges_between(apart),
                d = cell.repeats ? Vec3(apart - cell.edges * k) : apart;
-    const double distance = d.norm();
+    const double distance = d.norm(), apart_by = distance - one.radius - other.radius;
     const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3(Vec3::UnitZ());
     const PairLaw& pair = law(material_[i], material_[j]);
-    const double gap = distance - one.radius - other.radius;
     const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
     StepContact contact{i, static_cast<std::ptrdiff_t>(j), normal, 0, pair.friction, drift, d / cell.length};
-    give_levers(contact, one, centre(one) - (one.radius + gap / 2) * normal);
-    const double v_n = normal.dot(velocity_before(contact) - cell.rates * k);
+    give_levers(contact, one, centre(one) - (one.radius + apart_by / 2) * normal);
+    const Vec3 way = numbers_.h * (centre_velocity(one) - centre_velocity(other) - cell.rates * k);
+    const double v_n = normal.dot(velocity_before(contact) - cell.rates * k),
+                 gap = gap_on_the_way(normal, apart_by, d, way);
     const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
     const double reach = held.reach * std::min(one.radius, other.radius);
     if (!meets(numbers_, {gap, v_n, v_n, in_run(gap, i, in_.before.id[j])}, pair.restitution, reach,
@@ -268,6 +269,12 @@ class Builder {
   void meet_images() {
     for (std::size_t i = 0; i < balls_.size(); ++i)
       for (std::size_t j = 0; j < i; ++j) meet(balls_[i], balls_[j]);
+  }
+
+  /// Of the centre of a ball, before the step [m/s].
+  Vec3 centre_velocity(const BallAt& ball) const {
+    const Vec3& u = in_.before.u[ball.body];
+    return made_.clumps.empty() ? u : Vec3(u + lever(ball.body, ball.place) * made_.free.w[ball.body]);
   }
 
   /// How far the surface of a ball comes in the step, along a line [m].
@@ -325,8 +332,11 @@ class Builder {
     const Vec3 of_wall = wall.moves() ? Vec3(Vec3::Zero()) : in_.walls[w].velocity;
     const double speed = (in_.before.u[i] - of_wall).norm() + speed_of_turn(ball) + gained.norm() +
                          wall.speed_near(at, ball.radius);
-    for (const WallTouch& touch :
+    const Vec3 before = centre_velocity(ball) - wall.velocity_at(at);
+    const Way way{numbers_.h * before, numbers_.h * (before + gained)};
+    for (const WallTouch& seen :
          wall.touches(at, ball.radius + numbers_.alert + numbers_.h * speed, placed_[w])) {
+      const WallTouch touch = on_the_way(wall, placed_[w], at, ball.radius, way, seen);
       const Vec3 point = at - ball.radius * touch.normal;
       StepContact contact{i,
                           -1 - static_cast<std::ptrdiff_t>(w),
@@ -341,7 +351,7 @@ class Builder {
       const double reach = held.reach * ball.radius;
       if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), carries}, pair.restitution, reach,
                  contact.bias) ||
-          stands_on_another(walls_, placed_, w, at, ball.radius, touch))
+          stands_on_another(walls_, placed_, w, at, ball.radius, seen))
         continue;
       if (wall.moves()) made_.drive_speed = std::max(made_.drive_speed, contact.drift.norm());
       // In a cell the material of a wall goes with the flow, in its plane.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "apps/study_certificate/touch_shapes.hpp"
 
@@ -187,6 +188,99 @@ bool stands_on_another(std::span<const StepWall> walls, std::span<const Placemen
         nearest(other, step) < nearer && !leaves(other))
       return nearest(w, step) >= nearer;
   return false;
+}
+
+namespace {
+
+/// How a touch is followed along a way.
+struct Following {
+  int parts = 64;        ///< of the way; from one to the next a place moves little
+  double bends = 1e-3;   ///< a normal that has turned by less at the end is the same
+  double exact = 1e-12;  ///< part of the way to which a place on it is found
+  double beside = 1e-3;  ///< a place on the way that shows how the wall bends, and by how much a normal that
+  double straight = 1e-6;  ///< stays may turn until there
+};
+
+/// A touch of a sphere on its way, s in [0, 1].
+struct Followed {
+  double s = 0;
+  WallTouch touch;
+  Vec3 place = Vec3::Zero();  ///< on the wall [m]
+};
+
+/// The first place at which `holds`, between one where it does not and one where it does.
+template <class Next, class Holds>
+Followed first_place(const Next& next, const Holds& holds, Followed low, Followed high) {
+  while (high.s - low.s > Following{}.exact) {
+    const Followed middle = next(low, (low.s + high.s) / 2);
+    (holds(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
+}  // namespace
+
+WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& centre, double radius,
+                     const Way& way, const WallTouch& touch) {
+  constexpr Following follow;
+  const double gap = touch.distance - radius, far = touch.distance + 2 * way.before.norm();
+  if (wall.plane() || gap <= 0 || touch.normal.dot(way.before) >= 0 ||
+      gap + touch.normal.dot(way.loaded) >= 0)
+    return touch;
+  const auto next = [&](const Followed& last, double s) {
+    Followed nearest{s, last.touch, Vec3::Constant(INFINITY)};
+    for (const WallTouch& now : wall.touches(centre + s * way.before, far, where)) {
+      const Vec3 place = centre + s * way.before - now.distance * now.normal;
+      if ((place - last.place).norm() < (nearest.place - last.place).norm()) nearest = {s, now, place};
+    }
+    return nearest;
+  };
+  std::vector<Followed> all{{0, touch, centre - touch.distance * touch.normal}};
+  for (int k = 1; k <= follow.parts; ++k)
+    all.push_back(next(all.back(), static_cast<double>(k) / follow.parts));
+  if ((all.back().touch.normal - touch.normal).norm() < follow.bends) return touch;
+  const auto arrived = [&](const Followed& at) { return at.touch.distance <= radius; };
+  const auto parts = [&](const Followed& at) { return at.touch.normal.dot(way.before) >= 0; };
+  Followed nearest = all.back();
+  if (const auto found = std::ranges::find_if(all, parts); found != all.end())
+    nearest = first_place(next, parts, *(found - 1), *found);
+  Followed met = nearest;
+  if (arrived(nearest)) {
+    const auto found = std::ranges::find_if(all, arrived);
+    const Followed& high = found == all.end() || found->s > nearest.s ? nearest : *found;
+    met = first_place(
+        next, arrived,
+        *std::prev(std::ranges::find_if(all, [&](const Followed& at) { return at.s >= high.s; })), high);
+  }
+  // By how much the wall falls back behind the plane in which it is seen: not at all, or as a corner does, or
+  // as what bends about more than the sphere's distance from it, which keeps its normal.
+  const Followed beside = next(all.front(), follow.beside);
+  const double turned = (beside.touch.normal - touch.normal).norm(),
+               back = beside.touch.distance - touch.distance - beside.s * touch.normal.dot(way.before);
+  const bool bends_here = turned >= follow.straight;
+  if (bends_here && back <= 0) return touch;
+  if (bends_here && back < beside.touch.distance * turned * turned) {
+    const double by_loads = met.touch.normal.dot(way.before - way.loaded);
+    if (!arrived(nearest)) met.touch.distance += std::clamp(by_loads, 0.0, gap);
+    met.touch.distance -= met.s * met.touch.normal.dot(way.before);
+    return met.touch;
+  }
+  if (arrived(nearest)) return touch;
+  WallTouch same = touch;
+  same.distance = nearest.touch.distance - touch.normal.dot(way.before) +
+                  std::clamp(touch.normal.dot(way.before - way.loaded), 0.0, gap);
+  return same;
+}
+
+double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Vec3& way) {
+  const double along = normal.dot(way);
+  const Vec3 aside = way - along * normal;
+  if (!(gap > 0 && gap + along < 0 && aside.norm() > Following{}.bends * d.norm())) return gap;
+  // By how far the line of the way passes the other centre, where that lies on it.
+  const double length = way.norm(), before = -d.dot(way) / length;
+  const double nearest = before < length ? (d + before / length * way).norm() : (d + way).norm();
+  const double touching = d.norm() - gap;
+  return nearest > touching ? nearest - touching - along : gap;
 }
 
 }  // namespace talus::audit

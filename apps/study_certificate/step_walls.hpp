@@ -74,4 +74,22 @@ class StepWall {
 bool stands_on_another(std::span<const StepWall> walls, std::span<const Placement> placed, std::size_t w,
                        const Vec3& centre, double radius, const WallTouch& touch);
 
+/// The way of a sphere against a wall from the middle of a step to that of the next [m].
+struct Way {
+  Vec3 before = Vec3::Zero();  ///< with the velocity before the step
+  Vec3 loaded = Vec3::Zero();  ///< and with what loads add to it
+};
+
+/// By what the law of a step judges a sphere before a wall that is no plane: where it would use up its gap
+/// and the wall bends along its way, the touch in which the sphere arrives on `before`, or that at which it
+/// is nearest where it does not; at a distance from which the way along that normal leads to where the sphere
+/// is by then, and where it does not arrive no nearer by what loads add, as far as the gap goes.
+WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& centre, double radius,
+                     const Way& way, const WallTouch& touch);
+
+/// Of two spheres that would use up their gap and turn about one another, the gap that leads along `normal`
+/// to where they are nearest on their way; else `gap` [m]. `d`: between their centres, along the normal;
+/// `way`: what it changes by [m].
+double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Vec3& way);
+
 }  // namespace talus::audit

@@ -7,6 +7,7 @@
 #include "kernels/detection/detail/contact_groups.hpp"
 #include "kernels/detection/detail/gap_kernels.hpp"
 #include "kernels/detection/detail/passing.hpp"
+#include "kernels/detection/detail/path_touch.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/law/gap_law.hpp"
 #include "kernels/simd/contact_view.hpp"
@@ -183,17 +184,19 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     collide(of, in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
+    const SurfacePoint met =
+        detail::touch_on_path(of, in.x[i], in.radius[i], in.time_step * v, in.time_step * free, *point);
     const PairLaw& law = law_of(phase, pair);
     const GapResult<double> found =
-        solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),
-                  law.restitution, law.reach() * in.radius[i]);
+        solve_gap(rule, met.distance - in.radius[i], met.normal.dot(v), met.normal.dot(free), law.restitution,
+                  law.reach() * in.radius[i]);
     if (found.absent || at_seam(in.walls, at(chunks.wall[chunk]), in.x[i], in.radius[i], *point)) continue;
     contacts.bias[place] = found.bias;
-    contacts.nx[place] = point->normal[0];
-    contacts.ny[place] = point->normal[1];
-    contacts.nz[place] = point->normal[2];
+    contacts.nx[place] = met.normal[0];
+    contacts.ny[place] = met.normal[1];
+    contacts.nz[place] = met.normal[2];
     contacts.first[place] = body;
-    write_drift(phase, point->normal, place, contacts);
+    write_drift(phase, met.normal, place, contacts);
     contacts.second[place] = -1 - feature;
     contacts.candidate[place++] = static_cast<std::int32_t>(k);
   }

@@ -305,6 +305,25 @@ template <class V>
   return reinterpret_cast<V>(reinterpret_cast<Bits>(v) & ~reinterpret_cast<Bits>(-V{}));
 }
 
+/// Whether a comparison holds in one lane at least.
+[[gnu::always_inline]] inline bool any_of(bool holds) {
+  return holds;
+}
+template <class Bits>
+[[gnu::always_inline]] inline bool any_of(Bits holds) {
+#ifdef __AVX512F__
+  if constexpr (sizeof(Bits) == 64)
+    return _mm512_test_epi64_mask(reinterpret_cast<__m512i>(holds), reinterpret_cast<__m512i>(holds)) != 0;
+#endif
+#ifdef __AVX__
+  if constexpr (sizeof(Bits) == 32)
+    return _mm256_testz_si256(reinterpret_cast<__m256i>(holds), reinterpret_cast<__m256i>(holds)) == 0;
+#endif
+  bool any = false;
+  for (std::size_t l = 0; l < sizeof(Bits) / sizeof(holds[0]); ++l) any |= holds[l] != 0;
+  return any;
+}
+
 /// x, y, z of W vectors in space.
 template <class V>
 struct Space {

@@ -84,6 +84,14 @@ class Reference {
     };
     return part(bodies_[row.a], row.arm_a) - (row.wall ? 0 : part(bodies_[row.b], row.arm_b));
   }
+  /// Of balls that turn about one another on their way, and do not touch on it, the gap that leads along d to
+  /// where they are nearest.
+  static double passing_gap(const Vec3& d, const Vec3& way, double gap) {
+    const double far = d.norm(), along = d.dot(way) / far;
+    if (gap <= 0 || gap + along >= 0 || d.cross(way).norm() <= 1e-3 * far * far) return gap;
+    const double nearest = (d - std::clamp(d.dot(way) / way.squaredNorm(), -1.0, 0.0) * way).norm();
+    return nearest > far - gap ? nearest - (far - gap) - along : gap;
+  }
   void add(Row row, double gap) {
     if (gap >= alert_ && gap >= -h * speed(row)) return;
     row.bias = std::max(gap, 0.0) / h;
@@ -103,7 +111,11 @@ class Reference {
             const Vec3 d = one.centre - other.centre, n = d.normalized();
             const double gap = d.norm() - one.radius - other.radius;
             const Vec3 point = 0.5 * (one.centre - one.radius * n + other.centre + other.radius * n);
-            add({i, j, n, point - bodies_[i].x, point - bodies_[j].x, 0, false}, gap);
+            const auto way_of = [](const Rigid& body, const Vec3& centre) {
+              return Vec3(h * (body.u + body.omega().cross(centre - body.x)));
+            };
+            const Vec3 way = way_of(bodies_[i], one.centre) - way_of(bodies_[j], other.centre);
+            add({i, j, n, point - bodies_[i].x, point - bodies_[j].x, 0, false}, passing_gap(d, way, gap));
           }
       }
   }

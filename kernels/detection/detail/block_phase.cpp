@@ -4,7 +4,9 @@
 #include <vector>
 
 #include "kernels/bodies/index.hpp"
+#include "kernels/detection/detail/pair_path.hpp"
 #include "kernels/detection/detail/passing.hpp"
+#include "kernels/detection/detail/path_touch.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/touch.hpp"
 #include "kernels/shapes/clump_motion.hpp"
@@ -29,49 +31,78 @@ Vec3 velocity_at(const NarrowPhase& in, Slot slot, const Mat3& lever) {
 
 /// A candidate before its law is evaluated.
 struct Meeting {
-  Touch touch;
+  Touch touch;  ///< at a surface as touch_on_path has it
   Levers levers;
   Vec3 v = Vec3::Zero();     ///< of the first body's surface from the other's, as the step begins [m/s]
   Vec3 fall = Vec3::Zero();  ///< change of v in the step without contacts [m/s]
   Slot first = 0, second = 0;
   BallNumbers balls = 0;
   bool passed = false;
+  SurfacePoint seen = {};  ///< at a surface: from the middle of the step
 };
+
+/// The gap of two bodies by the straight ways of the centres of their balls (pair_path.hpp) [m]. `between`:
+/// from the second body to the first [m]; `images`: velocity of that [m/s].
+double gap_on_path(const NarrowPhase& in, const Vec3& between, const Vec3& images, const Meeting& meeting) {
+  const Touch& touch = meeting.touch;
+  if (!(touch.gap > 0)) return touch.gap;
+  const Vec3 arm = touch.ball.centre - in.x[at(meeting.first)], other = arm - touch.separation + between;
+  const Vec3 way =
+      in.time_step * (velocity_at(in, meeting.first, lever_of(in, meeting.first, arm)) -
+                      velocity_at(in, meeting.second, lever_of(in, meeting.second, other)) - images);
+  const auto space = [](const Vec3& v) { return Space<double>{v[0], v[1], v[2]}; };
+  const double far = touch.separation.norm();
+  if (!turns_on_path(space(touch.normal), touch.gap, space(way), far)) return touch.gap;
+  return talus::gap_on_path(space(touch.normal), touch.gap, space(touch.separation), space(way),
+                            far - touch.gap);
+}
 
 Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, BallNumbers balls) {
   Meeting meeting{
       touch_bodies(poses, pair.first, pair.second, balls), {}, {}, {}, pair.first, pair.second, balls};
-  const Touch& touch = meeting.touch;
+  Touch& touch = meeting.touch;
+  const Vec3 between = in.domain.separation(in.x[at(pair.first)], in.x[at(pair.second)]),
+             images = in.domain.image_velocity(in.x[at(pair.first)], in.x[at(pair.second)]);
   // Both arms lead to the same point, so that angular momentum is kept across a gap, too.
-  const Vec3 between = in.domain.separation(in.x[at(pair.first)], in.x[at(pair.second)]);
   const Vec3 arm = touch.point - in.x[at(pair.first)];
   meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between), arm};
   meeting.v = velocity_at(in, pair.first, meeting.levers.first) -
-              velocity_at(in, pair.second, meeting.levers.second) -
-              in.domain.image_velocity(in.x[at(pair.first)], in.x[at(pair.second)]);
+              velocity_at(in, pair.second, meeting.levers.second) - images;
   meeting.passed = passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap,
                           touch.smaller_radius, deep_of_blocks);
+  touch.gap = gap_on_path(in, between, images, meeting);
   return meeting;
 }
 
 Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   const Wall& wall = in.walls[at(pair.wall)];
   Meeting meeting{touch_wall(poses, wall, pair.body, pair.feature), {}, {}, {}, pair.body, -1 - pair.feature};
-  const Touch& touch = meeting.touch;
-  meeting.levers.arm = touch.point - in.x[at(pair.body)];
-  meeting.levers.first = lever_of(in, pair.body, meeting.levers.arm);
-  meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity_at(touch.point);
+  Touch& touch = meeting.touch;
   meeting.fall = in.time_step * in.gravity - wall.gain;
   if (wall.surface() != nullptr) {
+    const Ball& ball = touch.ball;
+    const Vec3 u = velocity_at(in, pair.body, lever_of(in, pair.body, ball.centre - in.x[at(pair.body)]));
     // Behind a thin surface, and in a solid, the point where the ball is near it now tells nothing.
-    const Mat3 lever = lever_of(in, pair.body, touch.ball.centre - in.x[at(pair.body)]);
-    const Vec3 v = velocity_at(in, pair.body, lever) - wall.came_at(touch.ball.centre);
-    meeting.passed = passed_surface(wall, touch.ball.centre, in.time_step * v, touch.ball.radius);
-    return meeting;
+    meeting.passed =
+        passed_surface(wall, ball.centre, in.time_step * (u - wall.came_at(ball.centre)), ball.radius);
+    const auto balls = static_cast<std::int32_t>(in.clumps.balls(at(pair.body)));
+    meeting.seen = {pair.feature / balls, touch.gap + ball.radius, touch.normal};
+    const Vec3 way = in.time_step * (u - wall.velocity_at(ball.centre));
+    const SurfacePoint met =
+        touch_on_path(wall, ball.centre, ball.radius, way, way + in.time_step * meeting.fall, meeting.seen);
+    if (met.distance != meeting.seen.distance) {
+      touch.normal = met.normal;
+      touch.gap = met.distance - ball.radius;
+      touch.point = ball.centre - ball.radius * met.normal;
+    }
   }
+  meeting.levers.arm = touch.point - in.x[at(pair.body)];
+  meeting.levers.first = lever_of(in, pair.body, meeting.levers.arm);
+  const Vec3 u = velocity_at(in, pair.body, meeting.levers.first);
+  meeting.v = u - wall.velocity_at(touch.point);
+  if (wall.surface() != nullptr) return meeting;
   // The wall counts as the surface of a body as large as the ball.
-  const Vec3 v = velocity_at(in, pair.body, meeting.levers.first) - wall.came_at(touch.point);
-  const double way = in.time_step * touch.normal.dot(v);
+  const double way = in.time_step * touch.normal.dot(u - wall.came_at(touch.point));
   meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.smaller_radius;
   return meeting;
 }
@@ -81,18 +112,17 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
 bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
   const Wall& wall = in.walls[at(pair.wall)];
   if (wall.surface() == nullptr) return true;
-  const auto balls = static_cast<std::int32_t>(in.clumps.balls(at(pair.body)));
   std::vector<SurfacePoint> points;
   collide(wall, meeting.touch.ball.centre,
           meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(), points);
-  return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
+  return std::ranges::find(points, meeting.seen.feature, &SurfacePoint::feature) != points.end();
 }
 
 /// at_seam, of a ball.
-bool touches_another(const NarrowPhase& in, const WallPair& pair, const Touch& touch) {
+bool touches_another(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
   if (in.walls[at(pair.wall)].surface() == nullptr) return false;
-  return at_seam(in.walls, at(pair.wall), touch.ball.centre, touch.ball.radius,
-                 {pair.feature, touch.gap + touch.ball.radius, touch.normal});
+  const Ball& ball = meeting.touch.ball;
+  return at_seam(in.walls, at(pair.wall), ball.centre, ball.radius, meeting.seen);
 }
 
 void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t place,
@@ -136,8 +166,7 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     const GapResult<double> found =
         solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall), law.restitution,
                   law.reach() * meeting.touch.smaller_radius);
-    if (found.absent || (wall && touches_another(in, candidates.wall_pairs[k - grains], meeting.touch)))
-      continue;
+    if (found.absent || (wall && touches_another(in, candidates.wall_pairs[k - grains], meeting))) continue;
     if (wall && !contacts.vx.empty())
       set_drift(contacts, place,
                 in.walls[at(chunks.wall[chunk])].drift_at(meeting.touch.point, meeting.touch.normal));

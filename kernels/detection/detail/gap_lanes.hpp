@@ -6,6 +6,7 @@
 /// square root, about 40 flop.
 
 #include "kernels/detection/detail/gap_kernels.hpp"
+#include "kernels/detection/detail/pair_path.hpp"
 #include "kernels/law/gap_law.hpp"
 #include "kernels/simd/lanes.hpp"
 #include "kernels/simd/transpose.hpp"
@@ -109,7 +110,11 @@ template <class V, class S, class E>
   const BitsOf<V> off = distance > 0;
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
                       off ? pair.d.z / distance : V{} + 1.0};
-  const V gap = distance - pair.radius_i - pair.radius_j, v_n = dot(n, pair.v);
+  const Space<V> way = (V{} + rule.time_step) * pair.v;
+  V gap = distance - pair.radius_i - pair.radius_j;
+  const V v_n = dot(n, pair.v);
+  if (const BitsOf<V> turns = turns_on_path(n, gap, way, distance); any_of(turns))
+    gap = turns ? gap_on_path(n, gap, pair.d, way, pair.radius_i + pair.radius_j) : gap;
   const V small = pair.radius_j < pair.radius_i ? pair.radius_j : pair.radius_i;
   // Gravity moves both alike.
   const GapResult<V> found = solve_gap(rule, gap, v_n, v_n, law.restitution, law.reach * small);
@@ -119,7 +124,6 @@ template <class V, class S, class E>
   store(out.bias + at, found.bias);
   const BitsOf<V> contact = ~found.absent;
   __builtin_memcpy(out.contact + at, &contact, sizeof(contact));
-  const Space<V> way = (V{} + rule.time_step) * pair.v;
   return ~(dot(way, way) < 0.25 * small * small);
 }
 
