@@ -221,6 +221,7 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
 
 std::vector<std::filesystem::path> files_read(const RunOptions& options, const io::Scene& scene) {
   std::vector<std::filesystem::path> files = io::files_read(scene);
+  files.emplace_back(options.scene);
   for (const std::string& trace : {options.replay_order, options.task_times})
     if (!trace.empty()) files.emplace_back(trace);
   return files;

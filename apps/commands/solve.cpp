@@ -80,7 +80,8 @@ struct Solved {
   SolveRow row;
   std::vector<double> r;
   std::int64_t failed_contacts = 0;
-  double approach = 0;  ///< of the contacts that the answer lets close fastest, over the largest |q|
+  double approach = 0;  ///< where it is too much: of the contacts that the answer lets close fastest, over
+                        ///< the largest |q|
 };
 
 /// Both errors compare with the impulses, which grow without bound where no velocity keeps all contacts open:
@@ -96,7 +97,9 @@ double approach_left(const DelassusProblem& problem, std::span<const double> r) 
   return given > 0 ? approach / given : 0;
 }
 
-/// The largest approach_left that is not told, unless a tolerance is as loose.
+/// An answer that leaves more than this approach, unless the tolerance is as loose, is none: a residual that
+/// is compared with the impulses says little where these are large, or friction is, as then it turns any
+/// approach into a part of the cone.
 constexpr double most_approach = 0.1;
 
 /// `alive` is called now and then while it solves.
@@ -122,7 +125,11 @@ Solved solve_one(const DelassusProblem& problem, const std::string& name, Delass
   std::nth_element(times.begin(), middle, times.end());
   solved.row = solve_row(name, problem.contacts(), method, report, *middle);
   solved.failed_contacts = report.failed_contacts;
-  if (report.converged) solved.approach = approach_left(problem, solved.r);
+  if (!report.converged) return solved;
+  const double approach = approach_left(problem, solved.r);
+  if (approach <= std::max(most_approach, 10 * options.tol)) return solved;
+  solved.approach = approach;
+  solved.row.converged = false;
   return solved;
 }
 
@@ -166,12 +173,12 @@ int solve(const SolveOptions& options, const Plan& plan) {
         print_error(
             "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
             file.path.string(), solved.failed_contacts);
-      if (solved.approach > std::max(most_approach, 10 * options.tol))
+      if (solved.approach > 0)
         print_error(
-            "talus: warning: {}: contacts still close at {:.2g} of the largest velocity in q. The error, "
-            "which "
-            "is relative to the impulses, is within its tolerance as these are large: there may be no "
-            "solution\n",
+            "talus: warning: {}: not solved: contacts still close at {:.2g} of the largest velocity in q, "
+            "though the error is within its tolerance. Either there is no solution, and impulses grow "
+            "without "
+            "bound, or the error says little, as friction is large: lower --tol\n",
             file.path.string(), solved.approach);
       rows.push_back(std::move(solved.row));
     }

@@ -83,10 +83,7 @@ class Builder {
     numbers_.turning = 0.5 * smallest_;
     take_walls();
     take_cell();
-    if (made_.cell.repeats)
-      meet_images();
-    else
-      meet_grains();
+    made_.cell.repeats ? meet_images() : meet_grains();
     meet_walls();
     pull_together();
     return std::move(made_);
@@ -214,18 +211,17 @@ class Builder {
     const Vec3 drift = (cell.before + cell.gain) * cell.edges * k;
     StepContact contact{i, static_cast<std::ptrdiff_t>(j), normal, 0, pair.friction, drift, d / cell.length};
     give_levers(contact, one, centre(one) - (one.radius + apart_by / 2) * normal);
-    const Vec3 way = numbers_.h * (centre_velocity(one) - centre_velocity(other) - cell.rates * k);
-    const double v_n = normal.dot(velocity_before(contact) - cell.rates * k),
-                 gap = gap_on_the_way(normal, apart_by, d, way);
     const Holding held = holding(pair, in_.before.radius[i], in_.before.radius[j]);
     const double reach = held.reach * std::min(one.radius, other.radius);
-    if (!meets(numbers_, {gap, v_n, v_n, in_run(gap, i, in_.before.id[j])}, pair.restitution, reach,
-               contact.bias))
-      return;
+    const Vec3 way = numbers_.h * (centre_velocity(one) - centre_velocity(other) - cell.rates * k);
+    const double v_n = normal.dot(velocity_before(contact) - cell.rates * k),
+                 gap = gap_on_the_way(normal, apart_by, d, {way, way, reach});
+    const InRun carries = in_run(gap, i, in_.before.id[j]);
+    if (!meets(numbers_, {gap, v_n, v_n, carries}, pair.restitution, reach, contact.bias)) return;
     contact.pull = gap <= reach ? acts_ * held.force : 0;
     made_.contacts.push_back(contact);
-    const double one_radius = in_.before.radius[i], other_radius = in_.before.radius[j];
-    resist_rolling(contact, pair, {one_radius * other_radius / (one_radius + other_radius), Vec3::Zero()});
+    const double R = in_.before.radius[i], S = in_.before.radius[j];
+    resist_rolling(contact, pair, {R * S / (R + S), Vec3::Zero()});
   }
 
   /// Of a contact: its reduced radius [m], and the angular velocity of a wall [rad/s].
@@ -273,8 +269,8 @@ class Builder {
 
   /// Of the centre of a ball, before the step [m/s].
   Vec3 centre_velocity(const BallAt& ball) const {
-    const Vec3& u = in_.before.u[ball.body];
-    return made_.clumps.empty() ? u : Vec3(u + lever(ball.body, ball.place) * made_.free.w[ball.body]);
+    if (made_.clumps.empty()) return in_.before.u[ball.body];
+    return in_.before.u[ball.body] + lever(ball.body, ball.place) * made_.free.w[ball.body];
   }
 
   /// How far the surface of a ball comes in the step, along a line [m].
@@ -333,7 +329,8 @@ class Builder {
     const double speed = (in_.before.u[i] - of_wall).norm() + speed_of_turn(ball) + gained.norm() +
                          wall.speed_near(at, ball.radius);
     const Vec3 before = centre_velocity(ball) - wall.velocity_at(at);
-    const Way way{numbers_.h * before, numbers_.h * (before + gained)};
+    const double reach = held.reach * ball.radius;
+    const Way way{numbers_.h * before, numbers_.h * (before + gained), reach};
     for (const WallTouch& seen :
          wall.touches(at, ball.radius + numbers_.alert + numbers_.h * speed, placed_[w])) {
       const WallTouch touch = on_the_way(wall, placed_[w], at, ball.radius, way, seen);
@@ -348,7 +345,6 @@ class Builder {
       const double gap = touch.distance - ball.radius,
                    v_n = touch.normal.dot(velocity_before(contact) - of_wall - contact.drift);
       const InRun carries = in_run(gap, i, -1 - static_cast<std::int64_t>(w));
-      const double reach = held.reach * ball.radius;
       if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), carries}, pair.restitution, reach,
                  contact.bias) ||
           stands_on_another(walls_, placed_, w, at, ball.radius, seen))

@@ -194,11 +194,10 @@ namespace {
 
 /// How a touch is followed along a way.
 struct Following {
-  int parts = 64;        ///< of the way; from one to the next a place moves little
-  double bends = 1e-3;   ///< a normal that has turned by less at the end is the same
-  double exact = 1e-12;  ///< part of the way to which a place on it is found
-  double beside = 1e-3;  ///< a place on the way that shows how the wall bends, and by how much a normal that
-  double straight = 1e-6;  ///< stays may turn until there
+  int parts = 64;          ///< of the way; from one to the next a place moves little
+  double bends = 1e-3;     ///< a normal that has turned by less at the end is the same
+  double exact = 1e-12;    ///< part of the way to which a place on it is found
+  double straight = 1e-6;  ///< a face's normal turns by less while an edge's would turn by `bends`
 };
 
 /// A touch of a sphere on its way, s in [0, 1].
@@ -207,6 +206,24 @@ struct Followed {
   WallTouch touch;
   Vec3 place = Vec3::Zero();  ///< on the wall [m]
 };
+
+/// How a wall falls back behind the plane in which it is seen: not at all, as a hollow that comes nearer, as
+/// a corner, or as what bends about more than the sphere's distance from it, which keeps its normal.
+enum class FallsBack { face, hollow, corner, round };
+
+/// Seen from `at` along `way`, forwards or backwards.
+template <class Next>
+FallsBack falls_back(const Next& next, const Followed& at, const Vec3& way) {
+  constexpr Following follow;
+  const double along = at.touch.normal.dot(way), aside = (way - along * at.touch.normal).norm(),
+               part = std::min(1.0, follow.bends * at.touch.distance / aside), sign = at.s > 0 ? -1 : 1;
+  const Followed beside = next(at, at.s + sign * part);
+  const double turned = (beside.touch.normal - at.touch.normal).norm();
+  if (turned < follow.straight) return FallsBack::face;
+  const double back = beside.touch.distance - at.touch.distance - part * along;
+  if (back <= 0) return FallsBack::hollow;
+  return back < beside.touch.distance * turned * turned ? FallsBack::corner : FallsBack::round;
+}
 
 /// The first place at which `holds`, between one where it does not and one where it does.
 template <class Next, class Holds>
@@ -224,14 +241,17 @@ WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& c
                      const Way& way, const WallTouch& touch) {
   constexpr Following follow;
   const double gap = touch.distance - radius, far = touch.distance + 2 * way.before.norm();
-  if (wall.plane() || gap <= 0 || touch.normal.dot(way.before) >= 0 ||
+  if (wall.plane() || touch.beside || gap <= way.held || touch.normal.dot(way.before) >= 0 ||
       gap + touch.normal.dot(way.loaded) >= 0)
     return touch;
   const auto next = [&](const Followed& last, double s) {
-    Followed nearest{s, last.touch, Vec3::Constant(INFINITY)};
+    Followed nearest{s, last.touch, last.place};
+    double least = INFINITY;
     for (const WallTouch& now : wall.touches(centre + s * way.before, far, where)) {
       const Vec3 place = centre + s * way.before - now.distance * now.normal;
-      if ((place - last.place).norm() < (nearest.place - last.place).norm()) nearest = {s, now, place};
+      if (now.beside || (place - last.place).norm() >= least) continue;
+      least = (place - last.place).norm();
+      nearest = {s, now, place};
     }
     return nearest;
   };
@@ -240,10 +260,10 @@ WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& c
     all.push_back(next(all.back(), static_cast<double>(k) / follow.parts));
   if ((all.back().touch.normal - touch.normal).norm() < follow.bends) return touch;
   const auto arrived = [&](const Followed& at) { return at.touch.distance <= radius; };
-  const auto parts = [&](const Followed& at) { return at.touch.normal.dot(way.before) >= 0; };
+  const auto leaves = [&](const Followed& at) { return at.touch.normal.dot(way.before) >= 0; };
   Followed nearest = all.back();
-  if (const auto found = std::ranges::find_if(all, parts); found != all.end())
-    nearest = first_place(next, parts, *(found - 1), *found);
+  if (const auto found = std::ranges::find_if(all, leaves); found != all.end())
+    nearest = first_place(next, leaves, *(found - 1), *found);
   Followed met = nearest;
   if (arrived(nearest)) {
     const auto found = std::ranges::find_if(all, arrived);
@@ -252,14 +272,10 @@ WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& c
         next, arrived,
         *std::prev(std::ranges::find_if(all, [&](const Followed& at) { return at.s >= high.s; })), high);
   }
-  // By how much the wall falls back behind the plane in which it is seen: not at all, or as a corner does, or
-  // as what bends about more than the sphere's distance from it, which keeps its normal.
-  const Followed beside = next(all.front(), follow.beside);
-  const double turned = (beside.touch.normal - touch.normal).norm(),
-               back = beside.touch.distance - touch.distance - beside.s * touch.normal.dot(way.before);
-  const bool bends_here = turned >= follow.straight;
-  if (bends_here && back <= 0) return touch;
-  if (bends_here && back < beside.touch.distance * turned * turned) {
+  const FallsBack here = falls_back(next, all.front(), way.before),
+                  there = falls_back(next, met, -way.before);
+  if (here == FallsBack::hollow || there == FallsBack::hollow) return touch;
+  if (here == FallsBack::corner || there == FallsBack::corner) {
     const double by_loads = met.touch.normal.dot(way.before - way.loaded);
     if (!arrived(nearest)) met.touch.distance += std::clamp(by_loads, 0.0, gap);
     met.touch.distance -= met.s * met.touch.normal.dot(way.before);
@@ -272,13 +288,14 @@ WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& c
   return same;
 }
 
-double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Vec3& way) {
-  const double along = normal.dot(way);
-  const Vec3 aside = way - along * normal;
-  if (!(gap > 0 && gap + along < 0 && aside.norm() > Following{}.bends * d.norm())) return gap;
+double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Way& way) {
+  const double along = normal.dot(way.before);
+  const Vec3 aside = way.before - along * normal;
+  if (!(gap > way.held && gap + along < 0 && aside.norm() > Following{}.bends * d.norm())) return gap;
   // By how far the line of the way passes the other centre, where that lies on it.
-  const double length = way.norm(), before = -d.dot(way) / length;
-  const double nearest = before < length ? (d + before / length * way).norm() : (d + way).norm();
+  const double length = way.before.norm(), before = -d.dot(way.before) / length;
+  const double nearest =
+      before < length ? (d + before / length * way.before).norm() : (d + way.before).norm();
   const double touching = d.norm() - gap;
   return nearest > touching ? nearest - touching - along : gap;
 }

@@ -15,6 +15,8 @@ namespace talus::audit {
 struct WallTouch {
   double distance = 0;         ///< [m] of its centre; below 0 in a solid or behind a plane
   Vec3 normal = Vec3::Zero();  ///< unit, from the wall to the centre
+  bool beside =
+      false;  ///< one of the two of a circle that stand beside the nearest, wherever the centre goes
 };
 
 /// A rigid displacement: X -> turn X + shift.
@@ -78,6 +80,7 @@ bool stands_on_another(std::span<const StepWall> walls, std::span<const Placemen
 struct Way {
   Vec3 before = Vec3::Zero();  ///< with the velocity before the step
   Vec3 loaded = Vec3::Zero();  ///< and with what loads add to it
+  double held = 0;             ///< up to this gap cohesion holds, and the way counts for nothing
 };
 
 /// By what the law of a step judges a sphere before a wall that is no plane: where it would use up its gap
@@ -90,6 +93,6 @@ WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& c
 /// Of two spheres that would use up their gap and turn about one another, the gap that leads along `normal`
 /// to where they are nearest on their way; else `gap` [m]. `d`: between their centres, along the normal;
 /// `way`: what it changes by [m].
-double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Vec3& way);
+double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Way& way);
 
 }  // namespace talus::audit

@@ -68,6 +68,7 @@ std::vector<WallTouch> touch_shell(const Profile& profile, const Vec3& centre) {
   for (const double turn : {2 * std::numbers::pi / 3, -2 * std::numbers::pi / 3}) {
     const Vec3 other = Eigen::AngleAxisd(turn, profile.axis) * direction;
     all.push_back(from_point(centre, profile.nearest(other, radial.dot(other), up), -other));
+    all.back().beside = true;
   }
   return all;
 }

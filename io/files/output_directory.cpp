@@ -165,7 +165,8 @@ void check_output_files(const std::vector<fs::path>& inputs, const std::vector<f
       throw FileError(out.string(), "is no regular file; give the name of a file");
     if (!force && fs::exists(out, error))
       throw FileError(out.string(), "exists; give another name, or replace it with --force");
-    places.push_back(fs::weakly_canonical(out, error));
+    // Of a relative path without a folder the function would leave it so, and "./a" be another than "a".
+    places.push_back(fs::weakly_canonical(fs::absolute(out), error));
     if (std::ranges::count(places, places.back()) > 1)
       throw FileError(out.string(), "is asked for twice; give every output a name of its own");
   }

@@ -175,8 +175,9 @@ bool lost_in_rounding(const BodyProblem& problem, const Correction& rounds, cons
                       const ClusterThresholds& thresholds) {
   double mass = 0;
   for (const BodyUnknown& body : problem.bodies) mass += body.mass;
-  return larger(rounds.at_first, rounds.error()) <= thresholds.rounding * mass * goal.still &&
-         mass_ratio(problem) <= thresholds.rounding_apart;
+  double wrong = larger(rounds.at_first, rounds.error());
+  for (const Vec3& change : rounds.impulse) wrong = larger(wrong, change.norm());
+  return wrong <= thresholds.rounding * mass * goal.still && mass_ratio(problem) <= thresholds.rounding_apart;
 }
 
 /// What follows where rounds have not settled. `answer`: theirs, in; the best, out.

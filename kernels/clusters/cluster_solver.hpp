@@ -36,10 +36,11 @@ struct ClusterThresholds {
   /// Without friction velocities are compared in the kinetic norm, too, in which light bodies count beside
   /// heavy ones, with what contacts exchange there, at least `pressed`, in (0, 1), of the largest impulse.
   double same_velocities = 0.1, same_law = 1e-3, pressed = 1e-2;
-  /// Where all that the law and the rounds find wrong is less than this part, in (0, 1), of what rounding of
-  /// positions makes of the bodies' momentum (ClusterGoal::still), the impulses are an answer: grains that
-  /// fly along walls, and close on them or part by the last bit. Not where all bodies together are more than
-  /// so many effective masses of a contact, > 1.
+  /// Where all that the law and the rounds find wrong, in momentum and in each impulse, is less than this
+  /// part, in (0, 1), of what rounding of positions makes of the momentum of all bodies (ClusterGoal::still),
+  /// the impulses are an answer: grains that fly along walls, and close on them or part by the last bit. Not
+  /// where all bodies together are more than so many effective masses of a contact, > 1: the lightest of them
+  /// may be off by as many times more.
   double rounding = 0.1, rounding_apart = 100;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.

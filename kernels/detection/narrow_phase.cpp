@@ -184,9 +184,10 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     collide(of, in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
-    const SurfacePoint met =
-        detail::touch_on_path(of, in.x[i], in.radius[i], in.time_step * v, in.time_step * free, *point);
     const PairLaw& law = law_of(phase, pair);
+    const SurfacePoint met =
+        detail::touch_on_path(of, in.x[i], in.radius[i],
+                              {in.time_step * v, in.time_step * free, law.reach() * in.radius[i]}, *point);
     const GapResult<double> found =
         solve_gap(rule, met.distance - in.radius[i], met.normal.dot(v), met.normal.dot(free), law.restitution,
                   law.reach() * in.radius[i]);

@@ -47,6 +47,12 @@ class Surface {
   }
   /// The point of a feature for a sphere with this centre, at whatever distance.
   virtual SurfacePoint at(const Vec3& centre, std::int32_t feature) const = 0;
+  /// Whether the point of a feature stands beside the nearest one, as two of the three of a circle do, and
+  /// goes round with the centre faster than that may move.
+  virtual bool goes_round(std::int32_t feature) const {
+    static_cast<void>(feature);
+    return false;
+  }
   /// Appends, ascending, every feature in which a sphere can touch that has its centre within a way s of
   /// `centre`, and reaches `reach` - s: what the broad phase asks for.
   virtual void near(const Vec3& centre, double reach, std::vector<std::int32_t>& features) const {

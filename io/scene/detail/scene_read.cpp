@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
+#include <limits>
 #include <system_error>
 
 #include "io/scene/detail/foreign_words.hpp"
+#include "kernels/bodies/farthest.hpp"
 
 namespace talus::io::detail {
 
@@ -28,16 +31,28 @@ std::string found_text(const toml::node& node) {
   return node.is_table() ? "a table" : "a date or time";
 }
 
+/// Products of numbers of these units have to stay numbers, as those of pressures and areas.
+double largest_in(const std::string& unit) {
+  for (const char* length : {"m", "m/s", "m/s²", "rad/s", "1/s"})
+    if (unit == length) return farthest;
+  for (const char* load : {"Pa", "N", "m²", "kg/s"})
+    if (unit == load) return farthest * farthest;
+  return std::numeric_limits<double>::infinity();
+}
+
 struct Reader {
   const std::string& path;
-  const Range& range;
+  const KeyText& key;
   const std::string& expected;
 
   template <class Number>
   Number within_range(const toml::node& node, Number value) const {
     const auto real = static_cast<double>(value);
     if (!std::isfinite(real)) fail_at(node, path, fmt::format("must be finite, got {}", real));
-    if (!range.holds(real)) fail_at(node, path, fmt::format("must be {}, got {}", range_text(range), value));
+    if (!key.range.holds(real))
+      fail_at(node, path, fmt::format("must be {}, got {}", range_text(key.range), value));
+    if (const double largest = largest_in(key.unit); std::abs(real) > largest)
+      fail_at(node, path, fmt::format("must be within {} {}, got {}", largest, key.unit, value));
     return value;
   }
   [[noreturn]] void wrong_type(const toml::node& node) const {
@@ -66,9 +81,10 @@ std::vector<T> read_list(const toml::node& node, std::size_t length, const Reade
 
 }  // namespace
 
-Value read_value(const toml::node& node, const std::string& path, const Value& kind, const Range& range,
+Value read_value(const toml::node& node, const std::string& path, const KeyText& key,
                  const std::string& expected) {
-  const Reader reader{path, range, expected};
+  const Reader reader{path, key, expected};
+  const Value& kind = key.kind;
   if (std::holds_alternative<bool>(kind)) {
     if (!node.is_boolean()) reader.wrong_type(node);
     return node.as_boolean()->get();

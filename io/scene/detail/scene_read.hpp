@@ -10,9 +10,9 @@
 
 namespace talus::io::detail {
 
-/// The node's value as the key's kind; fails at the node when its type or range is wrong. `path` names the
-/// key in errors.
-Value read_value(const toml::node& node, const std::string& path, const Value& kind, const Range& range,
+/// The node's value as the key's kind; fails at the node when its type or range is wrong, or a number is
+/// larger than any of its unit can be. `path` names the key in errors.
+Value read_value(const toml::node& node, const std::string& path, const KeyText& key,
                  const std::string& expected);
 
 /// Fails when `table` has a key that is not in `known`, with what was probably meant.
@@ -50,7 +50,7 @@ void read_table(const toml::table& table, const std::string& path, const Section
       key.set(part, *key.automatic);
       continue;
     }
-    const Value value = read_value(*node, name, key.kind, key.range, expected);
+    const Value value = read_value(*node, name, key, expected);
     if (const auto* text = std::get_if<std::string>(&value); text && !key.choices.empty())
       if (std::find(key.choices.begin(), key.choices.end(), *text) == key.choices.end())
         fail_at(*node, name,

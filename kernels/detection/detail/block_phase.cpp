@@ -39,25 +39,29 @@ struct Meeting {
   BallNumbers balls = 0;
   bool passed = false;
   SurfacePoint seen = {};  ///< at a surface: from the middle of the step
+  double reach = 0;        ///< there: how far features can be that the ball may touch in it [m]
 };
 
-/// The gap of two bodies by the straight ways of the centres of their balls (pair_path.hpp) [m]. `between`:
-/// from the second body to the first [m]; `images`: velocity of that [m/s].
-double gap_on_path(const NarrowPhase& in, const Vec3& between, const Vec3& images, const Meeting& meeting) {
+/// The gap of two bodies by the straight ways of the centres of their balls (pair_path.hpp) [m], which have
+/// the velocity of the contact along the normal. `between`: from the second body to the first [m]; `images`:
+/// velocity of that [m/s]; `held`: how far cohesion reaches [m].
+double gap_on_path(const NarrowPhase& in, const Vec3& between, const Vec3& images, double held,
+                   const Meeting& meeting) {
   const Touch& touch = meeting.touch;
-  if (!(touch.gap > 0)) return touch.gap;
+  if (!(touch.gap > held && touch.gap < -in.time_step * touch.normal.dot(meeting.v))) return touch.gap;
   const Vec3 arm = touch.ball.centre - in.x[at(meeting.first)], other = arm - touch.separation + between;
   const Vec3 way =
       in.time_step * (velocity_at(in, meeting.first, lever_of(in, meeting.first, arm)) -
                       velocity_at(in, meeting.second, lever_of(in, meeting.second, other)) - images);
   const auto space = [](const Vec3& v) { return Space<double>{v[0], v[1], v[2]}; };
   const double far = touch.separation.norm();
-  if (!turns_on_path(space(touch.normal), touch.gap, space(way), far)) return touch.gap;
+  if (!turns_on_path(space(touch.normal), touch.gap, held, space(way), far)) return touch.gap;
   return talus::gap_on_path(space(touch.normal), touch.gap, space(touch.separation), space(way),
                             far - touch.gap);
 }
 
-Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, BallNumbers balls) {
+Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, BallNumbers balls,
+             double reach) {
   Meeting meeting{
       touch_bodies(poses, pair.first, pair.second, balls), {}, {}, {}, pair.first, pair.second, balls};
   Touch& touch = meeting.touch;
@@ -70,11 +74,11 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
               velocity_at(in, pair.second, meeting.levers.second) - images;
   meeting.passed = passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap,
                           touch.smaller_radius, deep_of_blocks);
-  touch.gap = gap_on_path(in, between, images, meeting);
+  touch.gap = gap_on_path(in, between, images, reach * touch.smaller_radius, meeting);
   return meeting;
 }
 
-Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
+Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair, double reach) {
   const Wall& wall = in.walls[at(pair.wall)];
   Meeting meeting{touch_wall(poses, wall, pair.body, pair.feature), {}, {}, {}, pair.body, -1 - pair.feature};
   Touch& touch = meeting.touch;
@@ -87,10 +91,12 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
         passed_surface(wall, ball.centre, in.time_step * (u - wall.came_at(ball.centre)), ball.radius);
     const auto balls = static_cast<std::int32_t>(in.clumps.balls(at(pair.body)));
     meeting.seen = {pair.feature / balls, touch.gap + ball.radius, touch.normal};
-    const Vec3 way = in.time_step * (u - wall.velocity_at(ball.centre));
+    const Vec3 way = in.time_step * (u - wall.velocity_at(ball.centre)),
+               loaded = way + in.time_step * meeting.fall;
+    meeting.reach = ball.radius + in.alert + loaded.norm();
     const SurfacePoint met =
-        touch_on_path(wall, ball.centre, ball.radius, way, way + in.time_step * meeting.fall, meeting.seen);
-    if (met.distance != meeting.seen.distance) {
+        touch_on_path(wall, ball.centre, ball.radius, {way, loaded, reach * ball.radius}, meeting.seen);
+    if (met.distance != meeting.seen.distance || met.normal != meeting.seen.normal) {
       touch.normal = met.normal;
       touch.gap = met.distance - ball.radius;
       touch.point = ball.centre - ball.radius * met.normal;
@@ -113,8 +119,7 @@ bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& mee
   const Wall& wall = in.walls[at(pair.wall)];
   if (wall.surface() == nullptr) return true;
   std::vector<SurfacePoint> points;
-  collide(wall, meeting.touch.ball.centre,
-          meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(), points);
+  collide(wall, meeting.touch.ball.centre, meeting.reach, points);
   return std::ranges::find(points, meeting.seen.feature, &SurfacePoint::feature) != points.end();
 }
 
@@ -157,12 +162,13 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
   std::size_t place = begin;
   for (std::size_t k = begin; k < at(chunks.begin[chunk + 1]); ++k) {
     const bool wall = k >= grains;
-    const Meeting meeting = wall ? meet(in, poses, candidates.wall_pairs[k - grains])
-                                 : meet(in, poses, candidates.grain_pairs[k], candidates.balls[k]);
+    const PairLaw& law = law_at(in.laws, candidates, materials, k);
+    const Meeting meeting =
+        wall ? meet(in, poses, candidates.wall_pairs[k - grains], law.reach())
+             : meet(in, poses, candidates.grain_pairs[k], candidates.balls[k], law.reach());
     through += meeting.passed ? 1 : 0;
     if (wall && !has_feature(in, candidates.wall_pairs[k - grains], meeting)) continue;
     const double v_n = meeting.touch.normal.dot(meeting.v);
-    const PairLaw& law = law_at(in.laws, candidates, materials, k);
     const GapResult<double> found =
         solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall), law.restitution,
                   law.reach() * meeting.touch.smaller_radius);

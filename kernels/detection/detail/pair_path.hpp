@@ -12,22 +12,23 @@ struct PathThresholds {
   /// A normal that turns by less on the way, > 0, is as good as one that does not: it tells a speed by less
   /// than this part of it.
   double flat = 1e-3;
-  double next = 1e-3;   ///< a part of a way past a wall, in (0, 1), on which it is seen how the wall bends:
-  double still = 1e-6;  ///< not at all where the normal turns by less there, > 0
+  double still = 1e-6;  ///< a wall is flat where its normal turns by less than this while an edge's would by
+                        ///< `flat`, > 0
   int halvings = 40;    ///< of a way past a wall, to find a place on it, >= 1
   int features = 8;     ///< of the wall that follow one another on it, at most, >= 1
 };
 
 namespace {
 
-/// Whether spheres that are apart and would use up their gap, as they change by `way` [m] what lies between
-/// their centres, see one another turn on it. `n`: to the first, `far`: between the centres [m], now.
+/// Whether spheres that are farther apart than cohesion holds them, `held` [m], and would use up their gap,
+/// as they change by `way` [m] what lies between their centres, see one another turn on it. `n`: to the
+/// first, `far`: between the centres [m], now.
 template <class V>
 [[gnu::always_inline]] inline decltype(V{} < V{})
-    turns_on_path(const Space<V>& n, V gap, const Space<V>& way, V far) {
+    turns_on_path(const Space<V>& n, V gap, V held, const Space<V>& way, V far) {
   constexpr double flat = PathThresholds{}.flat;
   const V along = dot(n, way);
-  return (gap > 0) & (gap < -along) & (dot(way, way) - along * along > flat * flat * far * far);
+  return (gap > held) & (gap < -along) & (dot(way, way) - along * along > flat * flat * far * far);
 }
 
 /// The gap by which the step is to judge such a pair, `gap` unless the spheres pass one another on a straight

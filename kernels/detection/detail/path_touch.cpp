@@ -30,17 +30,22 @@ OnWay end_of(const At& at, const Before& before, OnWay last, int halvings) {
   return last;
 }
 
-/// How a wall goes on beside the point of it that a sphere has before it now.
+/// How a wall goes on beside the point of it that a sphere has before it.
 enum class Bend { none, hollow, wide, sharp };
 
-/// By a place a little further on the way: an edge falls back by distance (1 - cos) of the angle by which the
-/// normal turns, what bends about more than the distance of the sphere by twice that and more.
-Bend bend_at(const SurfacePoint& first, const Vec3& way, const OnWay& next) {
-  const double turn2 = (next.point.normal - first.normal).squaredNorm();
-  if (turn2 < PathThresholds{}.still * PathThresholds{}.still) return Bend::none;
-  const double back = next.point.distance - first.distance - next.part * first.normal.dot(way);
+/// By a place so little further on `way` that the normal of an edge has turned by PathThresholds::flat: an
+/// edge falls back behind the plane of the normal by distance (1 - cos), what bends about more than the
+/// distance of the sphere by more than twice that for the angle by which its normal turns.
+Bend bend_at(const Wall& wall, const Vec3& centre, const Vec3& way, const SurfacePoint& point) {
+  constexpr PathThresholds thresholds;
+  const double along = point.normal.dot(way), aside = (way - along * point.normal).norm();
+  const double part = std::min(1.0, thresholds.flat * point.distance / aside);
+  const SurfacePoint next = point_at(wall, centre + part * way, point.feature);
+  const double turn2 = (next.normal - point.normal).squaredNorm();
+  if (turn2 < thresholds.still * thresholds.still) return Bend::none;
+  const double back = next.distance - point.distance - part * along;
   if (back <= 0) return Bend::hollow;
-  return back < next.point.distance * turn2 ? Bend::sharp : Bend::wide;
+  return back < next.distance * turn2 ? Bend::sharp : Bend::wide;
 }
 
 Vec3 touched(const Vec3& centre, const SurfacePoint& point) {
@@ -62,37 +67,45 @@ std::int32_t counting(const Wall& wall, const Vec3& centre, const SurfacePoint& 
 
 }  // namespace
 
-SurfacePoint touch_on_path(const Wall& wall, const Vec3& centre, double radius, const Vec3& way,
-                           const Vec3& loaded, const SurfacePoint& point) {
+SurfacePoint touch_on_path(const Wall& wall, const Vec3& centre, double radius, const PathOfStep& path,
+                           const SurfacePoint& point) {
   constexpr PathThresholds thresholds;
+  const Vec3& way = path.way;
   const double gap = point.distance - radius;
   const auto nears = [&](const SurfacePoint& now) { return now.normal.dot(way) < 0; };
   const auto outside = [&](const SurfacePoint& now) { return now.distance > radius; };
-  if (!(gap > 0 && nears(point) && gap + point.normal.dot(loaded) < 0)) return point;
+  if (!(gap > path.held && nears(point) && gap + point.normal.dot(path.loaded) < 0)) return point;
+  if (wall.surface()->goes_round(point.feature)) return point;
+  if ((point_at(wall, centre + way, point.feature).normal - point.normal).norm() < thresholds.flat)
+    return point;
+  const Bend bend = bend_at(wall, centre, way, point);
+  if (bend == Bend::hollow) return point;
   std::int32_t feature = point.feature;
   for (int k = 0; k < thresholds.features; ++k) {
     const auto at = [&](double part) { return point_at(wall, centre + part * way, feature); };
     OnWay nearest{1, at(1)};
-    if (k == 0 && (nearest.point.normal - point.normal).norm() < thresholds.flat) return point;
     if (!nears(nearest.point)) nearest = end_of(at, nears, nearest, thresholds.halvings);
     const bool passes = outside(nearest.point);
     OnWay met = passes ? nearest : end_of(at, outside, nearest, thresholds.halvings);
     const std::int32_t counts = counting(wall, centre + met.part * way, met.point);
-    if (counts >= 0 && counts != feature) {
+    if (counts < 0) return point;
+    if (counts != feature) {
       feature = counts;
       continue;
     }
-    const Bend bends = bend_at(point, way, {thresholds.next, at(thresholds.next)});
-    if (counts < 0 || bends == Bend::hollow) return point;
-    if (bends != Bend::sharp) {
+    // Where it comes from: a face that it leaves over an edge, or the edge itself.
+    const Bend there = bend_at(wall, centre + met.part * way, -way, met.point);
+    if (there == Bend::hollow) return point;
+    if (bend != Bend::sharp && there != Bend::sharp) {
       if (!passes) return point;
       met = {1, point};
       met.point.distance = nearest.point.distance;
     }
     // What passes by may be carried by others, and gains nothing by its weight.
-    const double by_loads = met.point.normal.dot(way - loaded);
+    const double by_loads = met.point.normal.dot(way - path.loaded);
     if (passes) met.point.distance += std::clamp(by_loads, 0.0, gap);
     met.point.distance -= met.part * met.point.normal.dot(way);
+    met.point.feature = point.feature;
     return met.point;
   }
   return point;

@@ -7,14 +7,23 @@
 
 namespace talus::detail {
 
+/// How a sphere goes against a wall from the middle of a step to that of the next, unless something stops it
+/// [m].
+struct PathOfStep {
+  Vec3 way;         ///< as it comes into the step
+  Vec3 loaded;      ///< and with what loads do meanwhile
+  double held = 0;  ///< up to this gap cohesion holds it: no path is asked for
+};
+
 /// The point by which a step is to judge a sphere that has the centre `centre` in the middle of the step and
-/// `point` before it there, and moves by `way` [m] against the wall until the middle of the next step, or
-/// with what loads do meanwhile by `loaded`. Where it nears and that closes the gap, and the wall bends, it
-/// is the one in which the sphere first touches the wall there on `way`, a straight line, or comes nearest to
-/// it if it passes; with a distance such that gap and way along the normal there give the gap at the end of
-/// the way, and so does what loads add where it passes, as others may carry it. A sphere that passes over the
-/// rim of a plate is not stopped by it, however the rim leans as seen from afar. Else `point`.
-SurfacePoint touch_on_path(const Wall& wall, const Vec3& centre, double radius, const Vec3& way,
-                           const Vec3& loaded, const SurfacePoint& point);
+/// `point` before it there. Where it nears, that closes the gap and the wall bends, it is at an edge the
+/// point in which the sphere first touches it on `way`, a straight line, or comes nearest to it if it passes;
+/// with a distance such that gap and way along the normal there give the gap at the end of the way, and so
+/// does what loads add where it passes, as others may carry it. Of what bends about more than the sphere's
+/// distance, and of a face before which the sphere is now, the normal stays, and so does the distance unless
+/// the sphere passes. A sphere that passes over the rim of a plate is not stopped by it, however the rim
+/// leans as seen from afar. Hollow walls, and all else: `point`.
+SurfacePoint touch_on_path(const Wall& wall, const Vec3& centre, double radius, const PathOfStep& path,
+                           const SurfacePoint& point);
 
 }  // namespace talus::detail

@@ -58,6 +58,8 @@ class Revolution final : public Surface {
     return given_.shell ? on_shell(centre, feature) : on_solid(centre);
   }
 
+  bool goes_round(std::int32_t feature) const override { return given_.shell && feature > 0; }
+
   void near(const Vec3& centre, double reach, std::vector<std::int32_t>& features) const override {
     if (!(at(centre, 0).distance < reach)) return;
     features.push_back(0);

@@ -172,6 +172,7 @@ TEST(OutputFile, ReplacesNothingUnlessForcedAndIsAskedForOnce) {
     fs::create_directories(scratch / "sub");
     EXPECT_THROW(check_output_files({}, {scratch / "new.csv", place}, true), FileError) << same;
   }
+  EXPECT_THROW(check_output_files({}, {"of_no_test.csv", "./of_no_test.csv"}, true), FileError);
 }
 
 TEST(OutputDirectory, ThatCannotBeMadeIsNamed) {

@@ -80,8 +80,8 @@ BodyProblem along_walls(double first, double second) {
 
 TEST(ClusterSolver, LeavesGrainsAloneThatCloseOnWallsByLessThanRoundingOfPositions) {
   const double still = 1e-15;  // [m/s]
-  for (const double first : {1e-18, -1e-18, 0.0, 3e-17})
-    for (const double second : {1e-18, -1e-18, 2e-18, -3e-17}) {
+  for (const double first : {1e-18, -1e-18, 0.0, 4e-18})
+    for (const double second : {1e-18, -1e-18, 2e-18, -4e-18}) {
       const ClusterAnswer answer = solve_cluster(
           along_walls(first, second), {.enough = 1e-15, .relative = 1e-2, .sweeps = 10, .still = still});
       EXPECT_TRUE(answer.solved) << first << ' ' << second;

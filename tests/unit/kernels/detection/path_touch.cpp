@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <random>
@@ -36,7 +37,7 @@ TEST(PairPath, GivesSpheresThatPassTheGapWhereTheyAreNearest) {
     const Vec3 d = uniform(random, 2, 3) * any_direction(random),
                way = uniform(random, 0, 2) * any_direction(random), n = d.normalized();
     const double gap = d.norm() - touching;
-    if (!turns_on_path(space(n), gap, space(way), d.norm())) {
+    if (!turns_on_path(space(n), gap, 0.0, space(way), d.norm())) {
       const bool straight = (way - n.dot(way) * n).norm() <= 1.01e-3 * d.norm();
       EXPECT_TRUE(straight || gap + n.dot(way) >= 0);
       continue;
@@ -58,7 +59,7 @@ TEST(PairPath, GivesSpheresThatPassTheGapWhereTheyAreNearest) {
 
 TEST(PairPath, LeavesPairsAloneThatComeStraightAtOneAnother) {
   const Vec3 d(0, 0, 2.1), way(1e-3, 0, -0.2);
-  EXPECT_FALSE(turns_on_path(space(d.normalized()), 0.1, space(way), 2.1));
+  EXPECT_FALSE(turns_on_path(space(d.normalized()), 0.1, 0.0, space(way), 2.1));
 }
 
 Wall wall_of(const std::string& shape, std::map<std::string, std::vector<double>> numbers,
@@ -88,17 +89,13 @@ TEST(TouchOnPath, IsThatInWhichABallFirstTouchesARimOrPassesIt) {
     const Vec3 centre(uniform(random, -0.5, 1.5), 0, uniform(random, 0.5, 1.5)),
         way(uniform(random, -1, 1), uniform(random, -0.2, 0.2), uniform(random, -0.5, 0.5));
     const SurfacePoint point = point_at(wall, centre, 0),
-                       met = detail::touch_on_path(wall, centre, 1, way, way, point);
+                       met = detail::touch_on_path(wall, centre, 1, {way, way}, point);
     if (point.distance <= 1 || point.distance - 1 + point.normal.dot(way) >= 0) {
       EXPECT_EQ(met.normal, point.normal);
       EXPECT_EQ(met.distance, point.distance);
       continue;
     }
     const double part = first_touch(centre, way);
-    if (part <= 1 && centre[0] <= 0) {
-      EXPECT_EQ(met.distance, point.distance) << "in front of the face, which is flat";
-      continue;
-    }
     if (part <= 1) {
       ++touches;
       const Vec3 there = centre + part * way;
@@ -113,28 +110,81 @@ TEST(TouchOnPath, IsThatInWhichABallFirstTouchesARimOrPassesIt) {
   EXPECT_GT(passes, 100);
 }
 
-// What lands on the next triangle is judged by that.
-TEST(TouchOnPath, FollowsABallFromOneTriangleToTheNext) {
-  const Wall wall = wall_of("mesh", {}, test::box_mesh({-1, -1, -1}, {1, 1, 0}, 2));
-  const Vec3 way(0.5, 0.1, -0.3);
-  for (double x = -0.7; x < 0.2; x += 0.01) {
-    const Vec3 centre(x, 0.03, 0.12);
-    std::vector<SurfacePoint> points;
-    collide(wall, centre, 1, points);
-    for (const SurfacePoint& point : points) {
-      if (point.normal[2] < 0.999) continue;
-      const SurfacePoint met = detail::touch_on_path(wall, centre, 0.1, way, way, point);
-      EXPECT_LT((met.normal - Vec3::UnitZ()).norm(), 1e-12);
-      EXPECT_NEAR(met.distance, 0.12, 1e-12);
+/// A roof whose faces fall off by 45 degrees from the edge x = z = 0, its triangles in this order or in the
+/// other one.
+Wall roof(bool other_order) {
+  std::vector<Triangle> triangles;
+  const Vec3 a(0, -9, 0), b(0, 9, 0), c(-9, -9, -9), d(-9, 9, -9), e(9, -9, -9), f(9, 9, -9);
+  test::add_quad(triangles, a, b, d, c);
+  test::add_quad(triangles, b, a, e, f);
+  test::add_quad(triangles, c, d, f, e);
+  triangles.push_back({a, c, e});
+  triangles.push_back({b, f, d});
+  if (other_order) std::ranges::reverse(triangles);
+  return wall_of("mesh", {}, std::move(triangles));
+}
+
+// Which of its triangles an edge is said to belong to is a matter of their order.
+TEST(TouchOnPath, DoesNotDependOnTheOrderOfTriangles) {
+  Random random(3);
+  const Wall walls[] = {roof(false), roof(true)};
+  int moved = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const Vec3 centre(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, 0.2, 1.5)),
+        way(uniform(random, -1, 1), uniform(random, -0.3, 0.3), uniform(random, -0.8, 0.2));
+    std::vector<SurfacePoint> judged[2];
+    for (std::size_t w = 0; w < 2; ++w) {
+      std::vector<SurfacePoint> points;
+      collide(walls[w], centre, 4, points);
+      for (const SurfacePoint& point : points) {
+        judged[w].push_back(detail::touch_on_path(walls[w], centre, 1, {way, way}, point));
+        moved += judged[w].back().distance != point.distance ? 1 : 0;
+      }
+      std::ranges::sort(judged[w], {}, [](const SurfacePoint& point) { return point.normal[0]; });
+    }
+    ASSERT_EQ(judged[0].size(), judged[1].size());
+    for (std::size_t p = 0; p < judged[0].size(); ++p) {
+      EXPECT_NEAR(judged[0][p].distance, judged[1][p].distance, 1e-9) << centre.transpose();
+      EXPECT_LT((judged[0][p].normal - judged[1][p].normal).norm(), 1e-9) << way.transpose();
     }
   }
+  EXPECT_GT(moved, 200);
+}
+
+// Two of the three points of a circle go round with the centre, and a tube holds what it holds.
+TEST(TouchOnPath, LeavesTheInsideOfATubeAsItIs) {
+  Random random(4);
+  const Wall tube =
+      wall_of("cylinder", {{"start", {0, 0, -9}}, {"end", {0, 0, 9}}, {"radius", {1.05}}, {"inside", {1}}});
+  for (int k = 0; k < 1000; ++k) {
+    const double off = uniform(random, 0, 0.05), angle = uniform(random, 0, 7);
+    const Vec3 centre(off * std::cos(angle), off * std::sin(angle), 0),
+        way = uniform(random, 0, 0.5) * any_direction(random);
+    std::vector<SurfacePoint> points;
+    collide(tube, centre, 2, points);
+    ASSERT_EQ(points.size(), 3U);
+    for (const SurfacePoint& point : points) {
+      const SurfacePoint met = detail::touch_on_path(tube, centre, 1, {way, way}, point);
+      EXPECT_EQ(met.distance, point.distance);
+      EXPECT_EQ(met.normal, point.normal);
+    }
+  }
+}
+
+// Up to where cohesion holds it a ball stays what it is in front of.
+TEST(TouchOnPath, LeavesWhatCohesionHolds) {
+  const Wall wall = wall_of("disc", {{"centre", {0, 0, 0}}, {"axis", {0, 0, 1}}, {"radius", {1}}});
+  const Vec3 centre(1.3, 0, 0.96), way(-0.3, 0, -0.01);
+  const SurfacePoint point = point_at(wall, centre, 0);
+  EXPECT_NE(detail::touch_on_path(wall, centre, 1, {way, way}, point).distance, point.distance);
+  EXPECT_EQ(detail::touch_on_path(wall, centre, 1, {way, way, 0.1}, point).distance, point.distance);
 }
 
 // Others may carry it: what its weight would add is not the wall's to stop.
 TEST(TouchOnPath, DoesNotStopByItsWeightABallThatPasses) {
   const Wall wall = wall_of("disc", {{"centre", {0, 0, 0}}, {"axis", {0, 0, 1}}, {"radius", {1}}});
   const Vec3 centre(1.3, 0, 1.001), way(-0.2, 0, 0), loaded(-0.2, 0, -0.002);
-  const SurfacePoint met = detail::touch_on_path(wall, centre, 1, way, loaded, point_at(wall, centre, 0));
+  const SurfacePoint met = detail::touch_on_path(wall, centre, 1, {way, loaded}, point_at(wall, centre, 0));
   EXPECT_GE(met.distance - 1 + met.normal.dot(loaded), 0);
 }
 
