@@ -15,7 +15,7 @@ constexpr const char* introduction = R"(# Scenes
 
 A scene is one TOML file with everything a run depends on. Units are SI. This page is written by
 `talus scene-reference` from the table that reads the files, so it knows every key there is; a key that is not
-here is refused, with its line, and so are numbers beyond 1e15 in m, m/s, m/s², rad/s and 1/s, or beyond 1e30
+here is refused, with its line, and so are numbers beyond 1e15 in m, m/s, rad/s and 1/s, or beyond 1e30
 in Pa, N, m² and kg/s.
 
 ```toml

@@ -377,6 +377,9 @@ TEST_F(Command, GivesTheSameBitsOnAnyNumberOfThreadsAndFromTheResolvedScene) {
   }
   ASSERT_EQ(run("run one/scene.resolved.toml --out again").code, 0);
   EXPECT_EQ(summary(at("again")).at("digest"), digest);
+  const std::string resolved = content(at("one/scene.resolved.toml"));
+  EXPECT_NE(run("run one/scene.resolved.toml --out one --force --set seed=2").code, 0) << "it is still read";
+  EXPECT_EQ(content(at("one/scene.resolved.toml")), resolved);
   ASSERT_EQ(run("run scene.toml --out other --set seed=2").code, 0);
   EXPECT_NE(summary(at("other")).at("digest"), digest);
 }

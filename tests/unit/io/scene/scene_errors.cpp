@@ -61,6 +61,9 @@ TEST(SceneErrors, NumbersOutOfRangeAreNamedWithTheirLimit) {
   expect_refused(replaced(scene_with(), "density = 2600", "density = 1e-300"), "density", "material.density",
                  "must be 1e-30 to 1e+30, got 1e-300");
   expect_line_refused("#wall", "mass = 1e154", "wall[0].mass", "must be 1e-60 to 1e+60, got 1e+154");
+  expect_line_refused("#wall", "area = 1e307", "wall[0].area", "must be within 1e+30 m², got 1e+307");
+  expect_line_refused("#wall", "initial_velocity = [0, 0, -1e16]", "wall[0].initial_velocity",
+                      "within 1e+15 m/s");
   expect_refused(replaced(scene_with(), "steps = 5", "steps = 0"), "steps = 0", "stage[0].end.steps",
                  "must be >= 1");
   expect_refused(scene_with("#tail", "[solver]\ntolerance = -1"), "tolerance", "solver.tolerance",
