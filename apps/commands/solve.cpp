@@ -176,9 +176,8 @@ int solve(const SolveOptions& options, const Plan& plan) {
       if (solved.approach > 0)
         print_error(
             "talus: warning: {}: not solved: contacts still close at {:.2g} of the largest velocity in q, "
-            "though the error is within its tolerance. Either there is no solution, and impulses grow "
-            "without "
-            "bound, or the error says little, as friction is large: lower --tol\n",
+            "though the error is within its tolerance. There is no solution, and impulses grow without "
+            "bound, or friction is so large that the error says little: lower --tol\n",
             file.path.string(), solved.approach);
       rows.push_back(std::move(solved.row));
     }
