@@ -173,11 +173,10 @@ bool velocities_suffice(const BodyProblem& problem, ClusterGoal goal, const Clus
 /// Rounds may not settle, as contacts close on bodies and part by the last bit of their velocities.
 bool lost_in_rounding(const BodyProblem& problem, const Correction& rounds, const ClusterGoal& goal,
                       const ClusterThresholds& thresholds) {
-  double mass = 0;
-  for (const BodyUnknown& body : problem.bodies) mass += body.mass;
   double wrong = larger(rounds.at_first, rounds.error());
   for (const Vec3& change : rounds.impulse) wrong = larger(wrong, change.norm());
-  return wrong <= thresholds.rounding * mass * goal.still && mass_ratio(problem) <= thresholds.rounding_apart;
+  return wrong <= thresholds.rounding * mass_of(problem) * goal.still &&
+         mass_ratio(problem) <= thresholds.rounding_apart;
 }
 
 /// What follows where rounds have not settled. `answer`: theirs, in; the best, out.

@@ -242,11 +242,16 @@ bool has_friction(const BodyProblem& problem) {
                      [](const ContactEquation& c) { return c.mu > 0; });
 }
 
-double mass_ratio(const BodyProblem& problem) {
-  double all = 0, least = std::numeric_limits<double>::infinity();
+double mass_of(const BodyProblem& problem) {
+  double all = 0;
   for (const BodyUnknown& body : problem.bodies) all += body.mass;
+  return all;
+}
+
+double mass_ratio(const BodyProblem& problem) {
+  double least = std::numeric_limits<double>::infinity();
   for (const ContactEquation& c : problem.contacts) least = std::min(least, effective_mass(problem, c));
-  return all / least;
+  return mass_of(problem) / least;
 }
 
 double largest_impulse(const BodyProblem& problem, std::span<const Vec3> change) {

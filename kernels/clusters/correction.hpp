@@ -123,7 +123,8 @@ Correction correction_of(const BodyProblem& problem, double enough,
 /// Some contact has it.
 bool has_friction(const BodyProblem& problem);
 
-/// Mass of all bodies together, over the least effective mass of a contact.
+/// Mass of all bodies together [kg]; and over the least effective mass of a contact.
+double mass_of(const BodyProblem& problem);
 double mass_ratio(const BodyProblem& problem);
 
 /// The largest impulse of the problem with these changes [N s].

@@ -12,10 +12,6 @@ struct PathThresholds {
   /// A normal that turns by less on the way, > 0, is as good as one that does not: it tells a speed by less
   /// than this part of it.
   double flat = 1e-3;
-  double still = 1e-6;  ///< a wall is flat where its normal turns by less than this while an edge's would by
-                        ///< `flat`, > 0
-  int halvings = 40;    ///< of a way past a wall, to find a place on it, >= 1
-  int features = 8;     ///< of the wall that follow one another on it, at most, >= 1
 };
 
 namespace {

@@ -37,9 +37,9 @@ enum class Bend { none, hollow, wide, sharp };
 /// edge falls back behind the plane of the normal by distance (1 - cos), what bends about more than the
 /// distance of the sphere by more than twice that for the angle by which its normal turns.
 Bend bend_at(const Wall& wall, const Vec3& centre, const Vec3& way, const SurfacePoint& point) {
-  constexpr PathThresholds thresholds;
+  constexpr WallPathThresholds thresholds;
   const double along = point.normal.dot(way), aside = (way - along * point.normal).norm();
-  const double part = std::min(1.0, thresholds.flat * point.distance / aside);
+  const double part = std::min(1.0, PathThresholds{}.flat * point.distance / aside);
   const SurfacePoint next = point_at(wall, centre + part * way, point.feature);
   const double turn2 = (next.normal - point.normal).squaredNorm();
   if (turn2 < thresholds.still * thresholds.still) return Bend::none;
@@ -69,14 +69,14 @@ std::int32_t counting(const Wall& wall, const Vec3& centre, const SurfacePoint& 
 
 SurfacePoint touch_on_path(const Wall& wall, const Vec3& centre, double radius, const PathOfStep& path,
                            const SurfacePoint& point) {
-  constexpr PathThresholds thresholds;
+  constexpr WallPathThresholds thresholds;
   const Vec3& way = path.way;
   const double gap = point.distance - radius;
   const auto nears = [&](const SurfacePoint& now) { return now.normal.dot(way) < 0; };
   const auto outside = [&](const SurfacePoint& now) { return now.distance > radius; };
   if (!(gap > path.held && nears(point) && gap + point.normal.dot(path.loaded) < 0)) return point;
   if (wall.surface()->goes_round(point.feature)) return point;
-  if ((point_at(wall, centre + way, point.feature).normal - point.normal).norm() < thresholds.flat)
+  if ((point_at(wall, centre + way, point.feature).normal - point.normal).norm() < PathThresholds{}.flat)
     return point;
   const Bend bend = bend_at(wall, centre, way, point);
   if (bend == Bend::hollow) return point;

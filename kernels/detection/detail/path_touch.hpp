@@ -7,6 +7,14 @@
 
 namespace talus::detail {
 
+/// Beside PathThresholds, of walls.
+struct WallPathThresholds {
+  double still = 1e-6;  ///< a wall is flat where its normal turns by less than this while an edge's would by
+                        ///< PathThresholds::flat, > 0
+  int halvings = 40;    ///< of a way, to find a place on it, >= 1
+  int features = 8;     ///< that follow one another on a way, at most, >= 1
+};
+
 /// How a sphere goes against a wall from the middle of a step to that of the next, unless something stops it
 /// [m].
 struct PathOfStep {
