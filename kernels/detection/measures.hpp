@@ -17,7 +17,8 @@ struct ContactSums {
   std::int64_t passed = 0;       ///< pairs that went through one another (Contacts::passed)
   double penetration = 0;        ///< sum of -gap over them [m]
   double penetration_max = 0;    ///< [m]
-  double deepest = 0;            ///< largest -gap over the smaller radius of the two that touch
+  double deepest = 0;            ///< largest -gap over the smaller radius of the two that touch; StepGraph
+                                 ///< adds that of candidates that are no contacts (unseen.hpp)
   Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  ///< sum of r (x) l [N s m], l the branch vector: h V
                                                      ///< times the Love-Weber stress
   double normal_impulse = 0;                         ///< sum of r_n [N s]

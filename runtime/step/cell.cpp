@@ -227,9 +227,9 @@ void check_cell(const Domain& domain, double largest, double margin) {
     const double edge = domain.edges()[axis];
     if (edge > 0 && edge < least)
       throw std::invalid_argument(fmt::format(
-          "cell: {} m along {} is less than {} m, twice the largest diameter and the distance at which "
-          "contacts are looked for: a grain would touch two images of another. Make the cell larger, or the "
-          "grains smaller",
+          "cell: {} m along {} is less than {} m, twice the sum of the largest diameter and the distance at "
+          "which candidates are looked for (alert and skin): a grain would touch two images of another. Make "
+          "the cell larger, or the grains smaller",
           edge, "xyz"[axis], least));
   }
 }

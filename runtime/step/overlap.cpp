@@ -6,19 +6,32 @@
 
 #include "kernels/detection/measures.hpp"
 #include "kernels/detection/touch.hpp"
+#include "kernels/detection/unseen.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/step/used_reach.hpp"
 
 namespace talus {
 
 namespace {
 
-BodyPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
+BodyPair pair_of(const StepState& state, Slot first, Slot second, std::int32_t wall) {
   const auto id = [&](Slot slot) {
     return static_cast<std::int64_t>(state.bodies.id[static_cast<std::size_t>(slot)]);
   };
-  const std::int64_t first = id(state.contacts.first[k]);
-  return wall >= 0 ? BodyPair::at_wall(first, wall)
-                   : BodyPair::of_bodies(first, id(state.contacts.second[k]));
+  return wall >= 0 ? BodyPair::at_wall(id(first), wall) : BodyPair::of_bodies(id(first), id(second));
+}
+BodyPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
+  return pair_of(state, state.contacts.first[k], state.contacts.second[k], wall);
+}
+
+/// An overlap over the smaller radius, and its pair.
+struct RankedOverlap {
+  double depth = 0;
+  BodyPair pair;
+};
+/// The deeper one, and of two as deep that of the first pair.
+void keep_worse(const RankedOverlap& other, RankedOverlap& worst) {
+  if (other.depth != worst.depth ? other.depth > worst.depth : other.pair < worst.pair) worst = other;
 }
 
 /// Calls visit(k, wall index or -1, touch) for each contact of this rank, with the present poses.
@@ -79,30 +92,36 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
   return gathered(given, ranks);
 }
 
-DeepestOverlap find_deepest_overlap(StepState& state, double deepest, double tolerance,
+DeepestOverlap find_deepest_overlap(StepState& state, const OverlapSums& sums, double tolerance,
                                     const graph::Communicator& ranks) {
-  if (deepest <= tolerance && state.given_overlaps->empty()) return {deepest, false, {}};
   const std::vector<GivenOverlap>& given = *state.given_overlaps;
-  struct Candidate {
-    double depth;
-    BodyPair pair;
+  const bool beyond = sums.bodies_beyond || sums.walls_beyond;
+  if (sums.deepest <= tolerance && given.empty() && !beyond) return {sums.deepest, false, {}};
+  RankedOverlap worst;
+  const auto consider = [&](const BodyPair& pair, double depth, double smaller_radius, double before) {
+    keep_worse({(depth - before) / smaller_radius, pair}, worst);
   };
-  Candidate worst{0, {}};
   std::vector<GivenOverlap> left;
-  const auto worse = [](const Candidate& a, const Candidate& b) {
-    return a.depth != b.depth ? a.depth > b.depth : a.pair < b.pair;
-  };
   for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
     if (!(touch.gap < 0)) return;
     const BodyPair pair = pair_of(state, k, wall);
     const double before = given_to(given, pair);
     if (before > 0) left.push_back({pair, std::min(before, -touch.gap)});
-    const Candidate here{(-touch.gap - before) / touch.smaller_radius, pair};
-    if (worse(here, worst)) worst = here;
+    consider(pair, -touch.gap, touch.smaller_radius, before);
   });
+  const Poses poses = poses_of(state);
+  for (std::size_t c = 0; c < state.chunks.size(); ++c)
+    find_unseen_overlaps(state.candidates, state.contacts, state.chunks, c, poses, 0,
+                         [&](const FoundOverlap& found) {
+                           const BodyPair pair = pair_of(state, found.first, found.second, found.wall);
+                           consider(pair, found.depth, found.smaller_radius, given_to(given, pair));
+                         });
+  if (beyond)
+    for (const PairOverlap& found : overlaps_with_others(state, sums.walls_beyond, ranks))
+      consider(found.pair, found.depth, found.smaller_radius, given_to(given, found.pair));
   if (!given.empty()) state.given_overlaps = gathered(left, ranks);
-  for (const Candidate& other : ranks.gather_records(std::span<const Candidate>(&worst, 1)))
-    if (worse(other, worst)) worst = other;
+  for (const RankedOverlap& other : ranks.gather_records(std::span<const RankedOverlap>(&worst, 1)))
+    keep_worse(other, worst);
   return {worst.depth, worst.depth > tolerance, worst.pair};
 }
 

@@ -54,10 +54,16 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
                                          double tolerance, const graph::Communicator& ranks,
                                          const OverlapThresholds& thresholds = {});
 
-/// The deepest overlap among the contacts of the step that has ended. `deepest`: its depth on all ranks, over
-/// the smaller radius (ContactSums); contacts are looked at only if that exceeds `tolerance` or overlaps were
-/// given. What has opened of the given overlaps is taken from state.given_overlaps. Collective.
-DeepestOverlap find_deepest_overlap(StepState& state, double deepest, double tolerance,
+/// What the sums of a step tell of its overlaps.
+struct OverlapSums {
+  double deepest = 0;  ///< among its candidates, over the smaller radius, on all ranks (ContactSums)
+  bool bodies_beyond = false, walls_beyond = false;  ///< these may overlap what is no candidate (StepSums)
+};
+
+/// The deepest overlap with which the step has ended, between any two bodies or a body and a wall. Pairs are
+/// looked at one by one only if `sums` exceed `tolerance`, or overlaps were given, or bodies have left their
+/// reach. What has opened of the given overlaps is taken from state.given_overlaps. Collective.
+DeepestOverlap find_deepest_overlap(StepState& state, const OverlapSums& sums, double tolerance,
                                     const graph::Communicator& ranks);
 
 }  // namespace talus

@@ -82,8 +82,9 @@ const StepReport& Simulation::step() {
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
   check_for_runaway(outcome, energy_free);
-  const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
-                                                      impl_->setup.solver.overlap_tolerance, impl_->ranks);
+  const DeepestOverlap overlap = find_deepest_overlap(
+      impl_->state, {outcome.sums.contacts.deepest, outcome.sums.bodies_beyond, outcome.sums.walls_beyond},
+      impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start, impl_->ranks);
   impl_->named_reports = impl_->named.end_step(named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();

@@ -106,15 +106,23 @@ double StepGraph::margin_of(std::size_t w) const {
          h * (h * parameters_.gravity.norm() + wall.gain.norm());
 }
 
-bool StepGraph::walls_left_margin() const {
-  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
-    const Wall& wall = state_.walls[w];
-    if (wall.absent) continue;
-    const double moved = wall.motion.empty()
-                             ? std::abs(wall.normal.dot(wall.point - state_.wall_then[w]))
+/// How far a wall has come nearer to any grain since the last broad phase, at most [m].
+double StepGraph::way_of_wall(std::size_t w) const {
+  const Wall& wall = state_.walls[w];
+  return wall.motion.empty() ? std::abs(wall.normal.dot(wall.point - state_.wall_then[w]))
                              : way_since(setup_.walls[w], wall, state_.wall_states[w], state_.time_then);
-    if (margin_of(w) + moved > wall_margin_[w]) return true;
-  }
+}
+
+bool StepGraph::walls_left_margin() const {
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    if (!state_.walls[w].absent && margin_of(w) + way_of_wall(w) > wall_margin_[w]) return true;
+  return false;
+}
+
+/// At the end of the step: whether a wall has come further than the margin with which candidates were found.
+bool StepGraph::walls_beyond_margin() const {
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    if (!state_.walls[w].absent && way_of_wall(w) > wall_margin_[w]) return true;
   return false;
 }
 

@@ -30,7 +30,8 @@ StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const S
       loop_(state, parameters, setup.solver, setup.decomposition, ranks),
       left_(shares_),
       pairs_(shares_),
-      motion_(shares_) {
+      motion_(shares_),
+      beyond_reach_(shares_) {
   build();
 }
 

@@ -33,6 +33,8 @@ struct StepSums {
   MotionSums motion;
   ContactSums contacts;
   bool broad_phase = false;     ///< candidates were found anew
+  bool bodies_beyond = false;   ///< at its end some have come further than candidates were looked for
+  bool walls_beyond = false;    ///< likewise
   std::int64_t migrants = 0;    ///< copies that came to a subdomain where their body did not stand
   std::int64_t candidates = 0;  ///< of all ranks
   StepTimes times;
@@ -116,7 +118,9 @@ class StepGraph {
   SlotRange range_of_share(std::size_t count, std::uint32_t share) const;
   SlotRange slots(std::uint32_t share) const;
   double margin_of(std::size_t w) const;
+  double way_of_wall(std::size_t w) const;
   bool walls_left_margin() const;
+  bool walls_beyond_margin() const;
   bool out_of_balance() const;
   std::vector<double> work() const;
   Per<SubdomainId, double> costs(std::span<const double> work) const;
@@ -149,6 +153,7 @@ class StepGraph {
   std::vector<std::vector<Escape>> left_;  ///< per share: grains that have used up their margins
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
+  std::vector<char> beyond_reach_;         ///< per share: whether one of its bodies is (StepSums)
   std::vector<ContactSums> contact_sums_;  ///< per chunk
   std::vector<WallSums> wall_sums_;        ///< per chunk
   StepSums sums_;

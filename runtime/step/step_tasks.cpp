@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <limits>
 
+#include "kernels/detection/unseen.hpp"
 #include "kernels/shapes/clump_motion.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
+#include "runtime/step/used_reach.hpp"
 #include "runtime/trace/order.hpp"
 
 namespace talus {
@@ -175,11 +177,15 @@ void StepGraph::finish_walls() {
 }
 
 void StepGraph::measure_share(std::uint32_t share) {
+  beyond_reach_[share] = any_beyond_reach(state_, slots(share)) ? 1 : 0;
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
     const Poses poses = poses_of(state_);
     contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c, poses);
+    double& deepest = contact_sums_[c].deepest;
+    find_unseen_overlaps(state_.candidates, state_.contacts, state_.chunks, c, poses, deepest,
+                         [&](const FoundOverlap& found) { deepest = std::max(deepest, found.part()); });
     wall_sums_[c] = {};
     if (const std::int32_t w = state_.chunks.wall[c]; w >= 0)
       wall_sums_[c] = measure_wall(state_.contacts, state_.chunks, c, poses,
@@ -191,9 +197,10 @@ void StepGraph::measure_share(std::uint32_t share) {
 namespace {
 
 /// The share of a subdomain in the report, as numbers that are sent.
-constexpr std::size_t row_width = 1 + 9 + 15;
+constexpr std::size_t row_width = 1 + 9 + 15 + 1;
 
-void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
+void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSums& contacts,
+               bool beyond_reach, double* row) {
   const double head[] = {static_cast<double>(subdomain.value()),
                          motion.energy.translation,
                          motion.energy.rotation,
@@ -212,6 +219,7 @@ void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSum
                          static_cast<double>(contacts.passed)};
   row = std::copy(std::begin(head), std::end(head), row);
   std::copy_n(contacts.moment.data(), 9, row);
+  row[9] = beyond_reach ? 1 : 0;
 }
 
 void add_row(const double* row, bool here, StepSums& sums) {
@@ -232,6 +240,7 @@ void add_row(const double* row, bool here, StepSums& sums) {
   contacts.passed = static_cast<std::int64_t>(row[15]);
   contacts.moment = Eigen::Map<const Eigen::Matrix3d>(row + 16);
   sums.contacts.add(contacts);
+  sums.bodies_beyond = sums.bodies_beyond || row[row_width - 1] > 0;
 }
 
 }  // namespace
@@ -250,14 +259,17 @@ void StepGraph::sum_up() {
   const Decomposition& all = state_.decomposition;
   std::vector<MotionSums> motion(all.here.size());
   std::vector<ContactSums> contacts(all.here.size());
-  for (std::uint32_t share = 0; share < shares_; ++share)
+  std::vector<char> beyond(all.here.size(), 0);
+  for (std::uint32_t share = 0; share < shares_; ++share) {
     motion[share / shares_per_subdomain_].add(motion_[share]);
+    if (beyond_reach_[share] != 0) beyond[share / shares_per_subdomain_] = 1;
+  }
   for (std::size_t c = 0; c < contact_sums_.size(); ++c)
     contacts[static_cast<std::size_t>(state_.chunks.subdomain[c])].add(contact_sums_[c]);
   const std::size_t width = row_width + WallSums::width * state_.walls.size();
   std::vector<double> rows(all.here.size() * width);
   for (const SubdomainPlace e : all.here.indices())
-    write_row(all.here[e], motion[e.at()], contacts[e.at()], &rows[e.at() * width]);
+    write_row(all.here[e], motion[e.at()], contacts[e.at()], beyond[e.at()] != 0, &rows[e.at() * width]);
   for (std::size_t c = 0; c < wall_sums_.size(); ++c)
     if (const std::int32_t w = state_.chunks.wall[c]; w >= 0)
       wall_sums_[c].add_to(&rows[static_cast<std::size_t>(state_.chunks.subdomain[c]) * width + row_width +
@@ -272,6 +284,7 @@ void StepGraph::sum_up() {
     for (std::size_t k = 0; k < of_walls.size(); ++k) of_walls[k] += by_subdomain[e][row_width + k];
   }
   take_wall_sums(of_walls);
+  sums_.walls_beyond = walls_beyond_margin();
   sums_.candidates = all_candidates_;
   contacts_before_ = loop_.result().contacts;
   imbalance_before_ = loop_.imbalance();

@@ -224,6 +224,8 @@ def test_a_sweep_says_which_key_it_does_not_know(heap, tmp_path):
     for name in ("material.friction", "steps", "digest"):
         with pytest.raises(ValueError, match=f"a column of its own called {name}"):
             talus.sweep(heap, tmp_path / "sweep", friction=[0.1], measure={name: lambda run: 1.0})
+    with pytest.raises(ValueError, match="material.friction: varied twice"):
+        talus.sweep(heap, tmp_path / "sweep", {"material.friction": [0.1, 0.2]}, friction=[0.5])
     with pytest.raises(ValueError, match="jobs must be 1 or more"):
         talus.sweep(heap, tmp_path / "sweep", friction=[0.1], jobs=0)
     assert not (tmp_path / "sweep").exists(), "nothing is run before all scenes are sound"

@@ -99,7 +99,7 @@ def sweep(
     {"peak": lambda run: run.triaxial["q_over_p"].max()}. The table is also written to out/sweep.csv.
 
     All scenes are checked before the first run begins: raises SceneError where one is wrong, ValueError where nothing is
-    varied, or a measure has the name of another column, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them, or has
+    varied, or a key twice, or a measure has the name of another column, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them, or has
     scenes of other values, or of the user's own, which stay. A run that
     fails does not end the others: its row has the exit code, `errors` the message. What a `measure` raises is raised
     when all runs have ended and the table is written, with NaN in its place.
@@ -111,7 +111,11 @@ def sweep(
             raise TypeError(f"{key}: give a list of values, [{given!r}]")
     if jobs < 1:
         raise ValueError(f"jobs must be 1 or more, got {jobs}")
-    values = {**(keys or {}), **_full_names(base, named, program)}
+    short = _full_names(base, named, program)
+    twice = sorted({*(keys or {})} & {*short})
+    if twice:
+        raise ValueError(f"{', '.join(twice)}: varied twice, in full and in short; give all its values once")
+    values = {**(keys or {}), **short}
     taken = sorted({*values, *RUN_COLUMNS, *SUMMARY} & set(measure or {}))
     if taken:
         raise ValueError(f"measure: the table has a column of its own called {', '.join(taken)}; choose another name")

@@ -13,8 +13,9 @@ Section<CellSpec> cell_keys() {
       "there "
       "may be planes ([theory.md](theory.md), \"Periodic cells\").",
       {key<C>("lengths", "m", not_negative,
-              "Edges of the cell along x, y, z, each at least twice the largest diameter and the distance at "
-              "which contacts are looked for; 0: no repetition along that axis.",
+              "Edges of the cell along x, y, z, each at least twice the sum of the largest diameter and the "
+              "distance "
+              "at which candidates are looked for (`alert` and `skin`); 0: no repetition along that axis.",
               &C::lengths)
            .need(),
        key<C>("origin", "m", any, "Lower corner of the cell, at most 1e9 of its edges away.", &C::origin)
