@@ -63,7 +63,10 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
     cell = end_in_cell(problem.cell, start.stage.time_step, problem.reflection, start.before, after);
   const Frame mean = mean_of_impact(problem.reflection, start.before, after, cell);
   const std::vector<Vec3> spins = spins_at_end(problem, after);
-  const StepEnd end{mean, run.r, cell.gained, spins};
+  std::vector<double> speeds;
+  for (std::size_t k = 0; k < after.u.size(); ++k)
+    speeds.push_back(start.before.u[k].norm() + after.u[k].norm());
+  const StepEnd end{mean, run.r, cell.gained, spins, speeds};
   step.unexplained = disagreement(problem, end);
   if (run.unknown > 0 || !(step.unexplained <= rounding)) {
     step.judged = Judged::other_problem;

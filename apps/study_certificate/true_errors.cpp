@@ -263,7 +263,8 @@ double disagreement(const StepProblem& problem, const StepEnd& end) {
   double impulse = 1e-300, most = 0;
   for (const Vec3& r : end.r) impulse = std::max(impulse, r.norm());
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    const double m = problem.mass[k], own = m * (end.after.u[k].norm() + problem.free.u[k].norm());
+    const double m = problem.mass[k], ends = end.speeds.empty() ? 0 : end.speeds[k],
+                 own = m * (end.after.u[k].norm() + problem.free.u[k].norm() + ends);
     most = larger(most, m * (motion.u[k] - end.after.u[k]).norm() / std::max(impulse, own));
     if (end.w.empty() || problem.spin_mobility[k] == 0) continue;
     const double J = 1 / problem.spin_mobility[k],

@@ -31,6 +31,9 @@ struct StepEnd {
   std::span<const Vec3> r;               ///< impulses_of
   CellVector cell = CellVector::Zero();  ///< U of Motion [m/s]
   std::span<const Vec3> w = {};          ///< spins_at_end; empty: not asked
+  /// Speeds of the grains before the step and after it, together [m/s]: what rounding is a part of, though
+  /// velocities that an impact turns round have a mean of 0. Empty: those of the problem are as large.
+  std::span<const double> speeds = {};
 };
 
 /// w of Motion that the run's grains have in the axes of the middle of the step, in the terms of the problem;

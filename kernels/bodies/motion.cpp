@@ -60,6 +60,11 @@ void MotionSums::add(const MotionSums& other) {
 
 namespace {
 
+/// What the free velocity of a body at x, of mid-step, has gained.
+Vec3 gain_at(const Vec3& x, const StepFinish& end) {
+  return end.cell ? Vec3(end.gain + end.cell->at(x)) : end.gain;
+}
+
 /// V = Vbar + E (Vbar - V-) of body s: written so, a body that meets nothing keeps its velocity to the bit.
 void reflect(Velocity& v, const FreeVelocity& free, std::size_t s, const Vec3& gain, const StepFinish& end) {
   for (std::size_t c = 0; c < 3; ++c) {
@@ -80,7 +85,7 @@ MotionSums finish_with(SlotRange range, std::span<Vec3> x, std::span<Velocity> v
     Vec3 u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
     const Vec3 change = u - u_free;
     if constexpr (Reflects) {
-      const Vec3 gain = end.cell ? Vec3(end.gain + end.cell->at(x[s])) : end.gain;
+      const Vec3 gain = gain_at(x[s], end);
       reflect(v, free, s, gain, end);
       u = {v.u[0], v.u[1], v.u[2]};
       u_free += end.reflection * gain;  // the loads' whole share
@@ -119,6 +124,15 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<Velocity> veloci
                   const StepFinish& end) {
   return end.reflection > 0 ? finish_with<true>(range, x, velocity, free, end)
                             : finish_with<false>(range, x, velocity, free, end);
+}
+
+void find_ends(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
+               const FreeVelocity& free, const StepFinish& end, std::span<Vec3> ends) {
+  for (std::size_t s = range.begin; s < range.end; ++s) {
+    Velocity v = velocity[s];
+    if (end.reflection > 0) reflect(v, free, s, gain_at(x[s], end), end);
+    ends[s] = x[s] + 0.5 * end.time_step * Eigen::Map<const Vec3>(v.u);
+  }
 }
 
 std::array<double, 4> turned(const std::array<double, 4>& q, const double* w, double radius,

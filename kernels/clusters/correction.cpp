@@ -1,6 +1,7 @@
 #include "kernels/clusters/correction.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -168,13 +169,42 @@ class Round {
       before = moved;
       motion = std::move(solution.motion);
       if (granted &&
-          converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_))
+          converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_) &&
+          !leap(result))
         break;
     }
     return motion;
   }
 
  private:
+  /// Without friction, where updates change next to nothing: looks at three more of them. In a direction that
+  /// W hardly resists all those to come may be most of the forces; they follow one another by one ratio, and
+  /// the multipliers go on by all of them at once. False, and nothing is done, where they do not: along
+  /// redundant contacts, which W does not resist at all, rounding changes multipliers, by no ratio.
+  bool leap(Correction& result) {
+    if (has_friction(all_) || result.pushed <= thresholds_.rounding * thresholds_.firmness) return false;
+    const std::vector<Vec3> kept = set_.change;
+    Correction next;
+    std::array<double, 3> pushed{};  // [N s]
+    std::vector<Vec3> last;
+    for (double& push : pushed) {
+      last = set_.change;
+      take_multipliers(firm_.solve(force()).motion, next);
+      for (std::size_t k = 0; k < last.size(); ++k) push = larger(push, (set_.change[k] - last[k]).norm());
+    }
+    const auto times_of = [&](std::size_t k) { return rest_of(pushed[k - 1], pushed[k], 0) / pushed[k]; };
+    const double times = times_of(2);
+    const bool creeps = times > 1 && times * thresholds_.same_forces * thresholds_.same_ratio < 1 &&
+                        std::abs(times - times_of(1)) <= thresholds_.same_ratio * times;
+    if (!creeps) {
+      set_.change = kept;
+      return false;
+    }
+    for (const std::size_t k : active_.origin) set_.change[k] += times * (set_.change[k] - last[k]);
+    result.pushed = times * next.pushed;
+    return true;
+  }
+
   /// k + H (rho w + s), the forces of contacts that carry and of those whose change is known.
   std::vector<Twist> force() const {
     std::vector<Twist> force(all_.bodies.size());

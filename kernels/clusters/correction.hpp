@@ -27,9 +27,10 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
   /// Without friction impulses are known where the last update of the multipliers has changed none by more
-  /// than this part of the largest, in (0, 1); and where a proximal step of this firmness would change none
-  /// by more.
-  double same_forces = 1e-4;
+  /// than this part of the largest, in (0, 1), unless the ratios of three more, alike to the part
+  /// `same_ratio` in (0, 1), tell of a creep (by up to 1/(`same_forces` `same_ratio`) updates like these);
+  /// and where a proximal step of this firmness would change none by more.
+  double same_forces = 1e-4, same_ratio = 1e-2;
   /// And where no contact has changed its state for more than this part of the largest impulse, in (0, 1): so
   /// much rounding makes. With friction steps end where the law finds no more wrong than that part of all
   /// impulses.

@@ -147,8 +147,8 @@ std::vector<AnsweredGroup> answered(const BodyProblem& cluster, std::span<const 
 }
 
 /// Joins those between which a contact closes under their answers: true where there are any.
-bool join_closing(const BodyProblem& cluster, const std::vector<AnsweredGroup>& groups, double least,
-                  std::vector<char>& joins) {
+bool join_closing(const BodyProblem& cluster, const std::vector<AnsweredGroup>& groups, const ErrorGoal& goal,
+                  const StepErrorThresholds& thresholds, std::vector<char>& joins) {
   if (groups.size() == 1) return false;
   std::vector<Twist> V(cluster.bodies.size());
   std::vector<std::size_t> of_body(cluster.bodies.size());
@@ -166,7 +166,10 @@ bool join_closing(const BodyProblem& cluster, const std::vector<AnsweredGroup>& 
     const ContactEquation& c = cluster.contacts[k];
     if (joins[k] != 0 || c.second < 0 || of_body[at(c.first)] == of_body[at(c.second)]) continue;
     const double scale = std::min(groups[of_body[at(c.first)]].scale, groups[of_body[at(c.second)]].scale);
-    if (closing(cluster, c, V) <= least * scale) continue;
+    const double lighter = std::min(cluster.bodies[at(c.first)].mass, cluster.bodies[at(c.second)].mass);
+    if (closing(cluster, c, V) <=
+        std::max(thresholds.closing * goal.enough * scale, thresholds.still * goal.still * lighter))
+      continue;
     joins[k] = 1;
     any = true;
   }
@@ -193,7 +196,7 @@ std::vector<AnsweredGroup> answered_groups(const BodyProblem& cluster, const Eve
                                            const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
   std::vector<char> joins = carrying(cluster);
   std::vector<AnsweredGroup> groups = answered(cluster, joins, {}, everywhere, goal, thresholds);
-  for (int round = 1; join_closing(cluster, groups, thresholds.closing * goal.enough, joins); ++round) {
+  for (int round = 1; join_closing(cluster, groups, goal, thresholds, joins); ++round) {
     if (round == thresholds.most_rounds)
       join_by_whole(cluster, groups, everywhere, goal, thresholds, joins);
     else if (round == 2 * thresholds.most_rounds)

@@ -26,7 +26,8 @@ void begin_positions(const Contacts& contacts, std::span<const Velocity> velocit
                      SweepSteps& steps);
 void end_positions(const Contacts& contacts, SingleState& single, SweepSteps& steps);
 
-/// Finds normals and b of a chunk from the places of its bodies. `part`: c in [0, 1].
+/// Finds normals and b of a chunk from the places of its bodies at the end of the step, before they are
+/// displaced. `part`: c in [0, 1].
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
                    double part, SingleState& single);
 

@@ -4,11 +4,50 @@
 
 namespace talus {
 
+namespace {
+
+/// Moves a wall from the middle of the step to its end. `copy`: null where this rank has none, and nothing
+/// that touches it.
+void move_on(const WallState& state, const WallCopy* copy, const StepParameters& parameters, Wall& wall) {
+  if (!wall.motion.empty()) {
+    if (wall.surface() != nullptr) {
+      wall.pose = state.end;
+    } else {
+      wall.point = state.end.of(state.middle.back(wall.point));
+      wall.normal = state.end.turn * (state.middle.turn.transpose() * wall.normal);
+    }
+    return;
+  }
+  Vec3 velocity = wall.velocity;
+  if (copy != nullptr) {
+    velocity = Eigen::Map<const Vec3>(copy->velocity);
+    velocity += parameters.reflection * (velocity - wall.velocity);
+  }
+  wall.point += 0.5 * parameters.time_step * velocity;
+}
+
+}  // namespace
+
+void PositionCorrection::find_end_of_step() {
+  const Bodies& bodies = state_.bodies;
+  x_.resize(bodies.size());
+  find_ends({0, bodies.size()}, bodies.x, bodies.velocity, state_.free, finish_of(state_, parameters_), x_);
+  walls_ = state_.walls;
+  for (std::size_t w = 0; w < walls_.size(); ++w) {
+    const WallState& wall = state_.wall_states[w];
+    move_on(wall, wall.copies.empty() ? nullptr : &state_.copies[wall.copies.front().at()], parameters_,
+            walls_[w]);
+  }
+  domain_ = state_.domain;
+  if (domain_.flows) end_flow(state_.flow, domain_);
+}
+
 void PositionCorrection::begin() {
   AccelerationHistory& acceleration = work_.lend_acceleration();
   begin_positions(state_.contacts, state_.bodies.velocity, state_.single, acceleration.steps);
   pushes_.resize(state_.candidates.size());
   acceleration.last_wall_v.resize(state_.chunks.size());
+  find_end_of_step();
   kept_ = state_.copies;
   for (WallCopy& copy : state_.copies) std::fill_n(copy.velocity, 3, 0.0);
 }
@@ -21,7 +60,8 @@ void PositionCorrection::run(std::size_t chunk, int epoch) {
   AccelerationHistory& acceleration = work_.lend_acceleration();
   WallCopy* const copy = chunks.wall[chunk] >= 0 ? &state_.copies[chunk] : nullptr;
   if (epoch == 0) {
-    find_overlaps(state_.contacts, chunks, chunk, poses_of(state_), part, single);
+    find_overlaps(state_.contacts, chunks, chunk,
+                  {x_, state_.bodies.radius, walls_, clumps_of(state_), domain_}, part, single);
     for (std::size_t k = range.begin; k < range.end; ++k) acceleration.steps.n[k] = 0;
     return first_pushes(state_.contacts, range, pushes_, part, single, copy);
   }

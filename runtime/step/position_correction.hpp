@@ -33,9 +33,9 @@ struct PositionCorrectionRule {
 class PositionCorrection {
  public:
   /// Keeps references.
-  PositionCorrection(StepState& state, const SolverSettings& settings, const SweepKernels& kernels,
-                     ChunkWork& work)
-      : state_(state), settings_(settings), kernels_(kernels), work_(work) {}
+  PositionCorrection(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+                     const SweepKernels& kernels, ChunkWork& work)
+      : state_(state), parameters_(parameters), settings_(settings), kernels_(kernels), work_(work) {}
 
   /// Whether the scene asks for it.
   bool wanted() const { return settings_.overlap_correction > 0; }
@@ -67,13 +67,21 @@ class PositionCorrection {
   void go_on_from(std::vector<float> pushes) { pushes_ = std::move(pushes); }
 
  private:
+  void find_end_of_step();
+
   StepState& state_;
+  const StepParameters& parameters_;
   const SolverSettings& settings_;
   const SweepKernels& kernels_;
   ChunkWork& work_;
   PositionCorrectionRule rule_;
   std::vector<float> pushes_;  ///< per candidate, of the last step; in units of mass x m
   std::vector<WallCopy> kept_, moved_;
+  // Where all are at the end of the step without displacements: overlaps that the step opens are not undone,
+  // and those that it makes are.
+  std::vector<Vec3> x_;
+  std::vector<Wall> walls_;
+  Domain domain_;
   bool found_ = false;
 };
 

@@ -102,7 +102,7 @@ SolverLoop::SolverLoop(StepState& state, const StepParameters& parameters, const
       gluing_(state, decomposition, ranks),
       global_(state, parameters, decomposition, gluing_, ranks),
       work_(state, parameters, kernels_, schedule_, courses_),
-      positions_(state, settings, kernels_, work_),
+      positions_(state, parameters, settings, kernels_, work_),
       certificate_(settings),
       problem_(state, global_, courses_, certificate_) {}
 

@@ -2,6 +2,14 @@
 
 namespace talus {
 
+StepFinish finish_of(const StepState& state, const StepParameters& parameters) {
+  return {.time_step = parameters.time_step,
+          .copies = {},
+          .reflection = parameters.reflection,
+          .gain = parameters.impulse_time() * parameters.gravity,
+          .cell = state.domain.flows ? &state.flow.gain : nullptr};
+}
+
 std::size_t memory_used(const StepState& state) {
   return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) +
          memory_used(state.contacts) + memory_used(state.decomposition) +

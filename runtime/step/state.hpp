@@ -102,6 +102,9 @@ inline Poses poses_of(const StepState& state) {
   return {state.bodies.x, state.bodies.radius, state.walls, clumps_of(state), state.domain};
 }
 
+/// How the bodies end a step, but for the shares of their copies.
+StepFinish finish_of(const StepState& state, const StepParameters& parameters);
+
 std::size_t memory_used(const StepState& state);
 
 }  // namespace talus

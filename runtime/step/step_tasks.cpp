@@ -119,12 +119,9 @@ void StepGraph::finish_share(std::uint32_t share) {
     add_gain(range, bodies.x, gained, state_.free);
     add_gain(range, bodies.x, gained, bodies.velocity);
   }
-  motion_[share] = finish(range, bodies.x, bodies.velocity, state_.free,
-                          {.time_step = parameters_.time_step,
-                           .copies = uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{},
-                           .reflection = parameters_.reflection,
-                           .gain = parameters_.impulse_time() * parameters_.gravity,
-                           .cell = state_.domain.flows ? &state_.flow.gain : nullptr});
+  StepFinish end = finish_of(state_, parameters_);
+  if (uneven) end.copies = {all.multiplicity, all.parts};
+  motion_[share] = finish(range, bodies.x, bodies.velocity, state_.free, end);
   loop_.positions().move(range, bodies.x);
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * parameters_.time_step);
   turn_clumps(range, bodies, state_.clumps, 0.5 * parameters_.time_step);
