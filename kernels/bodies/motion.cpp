@@ -126,12 +126,13 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<Velocity> veloci
                             : finish_with<false>(range, x, velocity, free, end);
 }
 
-void find_ends(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
-               const FreeVelocity& free, const StepFinish& end, std::span<Vec3> ends) {
+void find_ends(SlotRange range, const Bodies& bodies, const FreeVelocity& free, const StepFinish& end,
+               Bodies& ends) {
   for (std::size_t s = range.begin; s < range.end; ++s) {
-    Velocity v = velocity[s];
-    if (end.reflection > 0) reflect(v, free, s, gain_at(x[s], end), end);
-    ends[s] = x[s] + 0.5 * end.time_step * Eigen::Map<const Vec3>(v.u);
+    Velocity v = bodies.velocity[s];
+    if (end.reflection > 0) reflect(v, free, s, gain_at(bodies.x[s], end), end);
+    ends.x[s] = bodies.x[s] + 0.5 * end.time_step * Eigen::Map<const Vec3>(v.u);
+    if (!ends.velocity.empty()) ends.velocity[s] = v;
   }
 }
 

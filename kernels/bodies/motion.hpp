@@ -81,9 +81,10 @@ struct StepFinish {
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<Velocity> velocity, const FreeVelocity& free,
                   const StepFinish& end);
 
-/// Where the centres of the bodies in `range` will be then [m]; changes nothing else.
-void find_ends(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
-               const FreeVelocity& free, const StepFinish& end, std::span<Vec3> ends);
+/// Where the centres of the bodies in `range` will be then, and their velocities: x and, unless it is empty,
+/// `velocity` of `ends`, which has room for them. Nothing else is changed.
+void find_ends(SlotRange range, const Bodies& bodies, const FreeVelocity& free, const StepFinish& end,
+               Bodies& ends);
 
 /// The unit quaternion q turned by omega = w/R over `time_step`: exact for constant omega. w [m/s] of 3.
 std::array<double, 4> turned(const std::array<double, 4>& q, const double* w, double radius,

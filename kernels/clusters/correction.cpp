@@ -182,7 +182,9 @@ class Round {
   /// the multipliers go on by all of them at once. False, and nothing is done, where they do not: along
   /// redundant contacts, which W does not resist at all, rounding changes multipliers, by no ratio.
   bool leap(Correction& result) {
-    if (has_friction(all_) || result.pushed <= thresholds_.rounding * thresholds_.firmness) return false;
+    if (has_friction(all_) || has_rolling(all_) ||
+        result.pushed <= thresholds_.rounding * thresholds_.firmness)
+      return false;
     const std::vector<Vec3> kept = set_.change;
     Correction next;
     std::array<double, 3> pushed{};  // [N s]

@@ -26,8 +26,8 @@ void begin_positions(const Contacts& contacts, std::span<const Velocity> velocit
                      SweepSteps& steps);
 void end_positions(const Contacts& contacts, SingleState& single, SweepSteps& steps);
 
-/// Finds normals and b of a chunk from the places of its bodies at the end of the step, before they are
-/// displaced. `part`: c in [0, 1].
+/// Takes the normals of a chunk's contacts over, and finds b from the places of its bodies at the end of the
+/// step, before they are displaced. `part`: c in [0, 1].
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
                    double part, SingleState& single);
 

@@ -94,32 +94,40 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
 
 DeepestOverlap find_deepest_overlap(StepState& state, const OverlapSums& sums, double tolerance,
                                     const graph::Communicator& ranks) {
-  const std::vector<GivenOverlap>& given = *state.given_overlaps;
-  const bool beyond = sums.bodies_beyond || sums.walls_beyond;
-  if (sums.deepest <= tolerance && given.empty() && !beyond) return {sums.deepest, false, {}};
-  RankedOverlap worst;
+  const std::vector<GivenOverlap> given = *state.given_overlaps;
+  const bool beyond = sums.bodies_beyond || sums.walls_beyond,
+             looks = sums.deepest > tolerance || !given.empty();
+  if (!looks && !beyond) return {sums.deepest, false, {}};
+  RankedOverlap worst{looks ? 0 : sums.deepest, {}};
   const auto consider = [&](const BodyPair& pair, double depth, double smaller_radius, double before) {
     keep_worse({(depth - before) / smaller_radius, pair}, worst);
   };
-  std::vector<GivenOverlap> left;
-  for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
-    if (!(touch.gap < 0)) return;
-    const BodyPair pair = pair_of(state, k, wall);
-    const double before = given_to(given, pair);
-    if (before > 0) left.push_back({pair, std::min(before, -touch.gap)});
-    consider(pair, -touch.gap, touch.smaller_radius, before);
-  });
+  if (looks) {
+    std::vector<GivenOverlap> left;
+    for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
+      if (!(touch.gap < 0)) return;
+      const BodyPair pair = pair_of(state, k, wall);
+      const double before = given_to(given, pair);
+      if (before > 0) left.push_back({pair, std::min(before, -touch.gap)});
+      consider(pair, -touch.gap, touch.smaller_radius, before);
+    });
+    if (!given.empty()) state.given_overlaps = gathered(left, ranks);
+  }
+  // A pair that has parted, and was no contact, has its gift no more.
+  const auto consider_unseen = [&](const BodyPair& pair, double depth, double smaller_radius) {
+    const bool keeps = given_to(*state.given_overlaps, pair) > 0;
+    consider(pair, depth, smaller_radius, keeps ? given_to(given, pair) : 0);
+  };
   const Poses poses = poses_of(state);
-  for (std::size_t c = 0; c < state.chunks.size(); ++c)
+  for (std::size_t c = 0; looks && c < state.chunks.size(); ++c)
     find_unseen_overlaps(state.candidates, state.contacts, state.chunks, c, poses, 0,
                          [&](const FoundOverlap& found) {
-                           const BodyPair pair = pair_of(state, found.first, found.second, found.wall);
-                           consider(pair, found.depth, found.smaller_radius, given_to(given, pair));
+                           consider_unseen(pair_of(state, found.first, found.second, found.wall), found.depth,
+                                           found.smaller_radius);
                          });
   if (beyond)
     for (const PairOverlap& found : overlaps_with_others(state, sums.walls_beyond, ranks))
-      consider(found.pair, found.depth, found.smaller_radius, given_to(given, found.pair));
-  if (!given.empty()) state.given_overlaps = gathered(left, ranks);
+      consider_unseen(found.pair, found.depth, found.smaller_radius);
   for (const RankedOverlap& other : ranks.gather_records(std::span<const RankedOverlap>(&worst, 1)))
     keep_worse(other, worst);
   return {worst.depth, worst.depth > tolerance, worst.pair};

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "kernels/shapes/clump_motion.hpp"
+
 namespace talus {
 
 namespace {
@@ -30,8 +32,16 @@ void move_on(const WallState& state, const WallCopy* copy, const StepParameters&
 
 void PositionCorrection::find_end_of_step() {
   const Bodies& bodies = state_.bodies;
-  x_.resize(bodies.size());
-  find_ends({0, bodies.size()}, bodies.x, bodies.velocity, state_.free, finish_of(state_, parameters_), x_);
+  const SlotRange all{0, bodies.size()};
+  ends_.x.resize(bodies.size());
+  if (!bodies.shape.empty()) ends_.velocity.resize(bodies.size());
+  find_ends(all, bodies, state_.free, finish_of(state_, parameters_), ends_);
+  if (!bodies.shape.empty()) {
+    ends_.shape = bodies.shape;
+    ends_.radius = bodies.radius;
+    ends_.orientation = bodies.orientation;
+    turn_clumps(all, ends_, state_.clumps, 0.5 * parameters_.time_step);
+  }
   walls_ = state_.walls;
   for (std::size_t w = 0; w < walls_.size(); ++w) {
     const WallState& wall = state_.wall_states[w];
@@ -61,7 +71,7 @@ void PositionCorrection::run(std::size_t chunk, int epoch) {
   WallCopy* const copy = chunks.wall[chunk] >= 0 ? &state_.copies[chunk] : nullptr;
   if (epoch == 0) {
     find_overlaps(state_.contacts, chunks, chunk,
-                  {x_, state_.bodies.radius, walls_, clumps_of(state_), domain_}, part, single);
+                  {ends_.x, state_.bodies.radius, walls_, clumps_of(state_, ends_), domain_}, part, single);
     for (std::size_t k = range.begin; k < range.end; ++k) acceleration.steps.n[k] = 0;
     return first_pushes(state_.contacts, range, pushes_, part, single, copy);
   }

@@ -79,7 +79,7 @@ class PositionCorrection {
   std::vector<WallCopy> kept_, moved_;
   // Where all are at the end of the step without displacements: overlaps that the step opens are not undone,
   // and those that it makes are.
-  std::vector<Vec3> x_;
+  Bodies ends_;  ///< x; where there are clumps, what a turn asks for, too
   std::vector<Wall> walls_;
   Domain domain_;
   bool found_ = false;

@@ -135,6 +135,23 @@ TEST(Overlap, ThatHasOpenedIsNotGivenAgain) {
   }
 }
 
+// A ball that was given half a radius is in the floor by 0.1 when a step begins, and above it in its middle:
+// the floor is no contact. A heavy ball strikes it down, and it ends the step in by 0.124: nothing of that
+// was given.
+TEST(Overlap, ThatOpensWithinAStepIsNotGivenInIt) {
+  Bodies bodies;
+  add_ball(bodies, Vec3(0, 0, 0.5 * radius), Vec3(0, 0, 4));
+  add_sphere(bodies, BodyId{1}, Vec3(0, 0, 5.65 * radius), 3 * radius, density);
+  bodies.velocity.back().u[2] = -4;
+  talus::Setup setup = above_floor(2, 0.1);
+  setup.detection.alert = 1e-3 * radius;
+  const std::vector<StepReport> reports = reports_of(setup, bodies);
+  EXPECT_TRUE(reports[0].converged);
+  const double speed = 8.8 * 27 / 28 - 4;  // downwards, of the ball
+  EXPECT_NEAR(reports[1].overlap, 1 - (1.1 - speed * h / 2 / radius), 1e-9);
+  EXPECT_FALSE(reports[1].converged);
+}
+
 // Given overlaps and the deepest pair are the same however the sample is cut and whoever has its parts.
 TEST(Overlap, IsTheSameOnAnyRanks) {
   talus::Setup setup = test::pressed_setup(test::box_of_walls(-1, 7), 0.3, 4, 1e6, 200);
