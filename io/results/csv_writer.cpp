@@ -87,9 +87,8 @@ constexpr Column<StepReport> steps_columns[] = {
     {"penetration_max", "1", "largest overlap over the smallest radius",
      [](std::string& t, const auto& r) { put(t, r.penetration_max); }},
     {"overlap", "1",
-     "largest overlap with which the step ends that the run has made, over the smaller radius of the pair; "
-     "of "
-     "all pairs, contacts or not",
+     "largest overlap with which the step ends that the run has made, over the smaller radius of the pair: "
+     "of all pairs, contacts or not",
      [](std::string& t, const auto& r) { put(t, r.overlap); }},
     {"overlap_body", "1", "id of the first body of that pair where it is beyond its tolerance, else -1",
      [](std::string& t, const auto& r) { put(t, r.overlapping ? r.overlapping->body : -1); }},

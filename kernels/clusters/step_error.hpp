@@ -28,9 +28,9 @@ struct StepErrorThresholds {
   /// Contacts without an impulse part a cluster into groups, unless under the answers of these they close
   /// with more than this part, in (0, 1), of what need not be told apart, and with more than rounding of
   /// positions makes (`still`). Small, as a nearly straight chain is moved by thousands of times what a
-  /// contact of it closes by. In the so-many-th round of joining
-  /// those that do, >= 1, what an answer of the whole cluster has carry joins, too, and in round twice that
-  /// number all. Groups that have changed are answered anew in each round, each with its own budget.
+  /// contact of it closes by. In the so-many-th round of joining those that do, >= 1, what an answer of the
+  /// whole cluster has carry joins, too, and in round twice that number all. Groups that have changed are
+  /// answered anew in each round, each with its own budget.
   double closing = 1e-6;
   int most_rounds = 4;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.

@@ -14,8 +14,8 @@ Section<CellSpec> cell_keys() {
       "may be planes ([theory.md](theory.md), \"Periodic cells\").",
       {key<C>("lengths", "m", not_negative,
               "Edges of the cell along x, y, z, each at least twice the sum of the largest diameter and the "
-              "distance "
-              "at which candidates are looked for (`alert` and `skin`); 0: no repetition along that axis.",
+              "distance at which candidates are looked for (`alert` and `skin`); 0: no repetition along that "
+              "axis.",
               &C::lengths)
            .need(),
        key<C>("origin", "m", any, "Lower corner of the cell, at most 1e9 of its edges away.", &C::origin)

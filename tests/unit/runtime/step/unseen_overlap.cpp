@@ -135,48 +135,64 @@ int compare(const Scene& scene) {
   return alone.unseen;
 }
 
-talus::Setup& in_a_box(Scene& scene) {
+void put_in_a_box(Scene& scene) {
   scene.setup.walls = test::box_of_walls(0, edge);
-  return scene.setup;
 }
-talus::Setup& in_a_cell(Scene& scene) {
+void put_in_a_cell(Scene& scene) {
   scene.setup.domain = periodic_domain(Vec3::Constant(edge));
   scene.setup.stages[0].shear_rates = {0, 3, 0};
   scene.setup.stages[0].strain_rates = {-1, 0, 1};
-  return scene.setup;
 }
 
-// With a wide skin all of them are candidates; without, bodies leave the reach in which these were looked
-// for.
-TEST(OverlapOfThoseThatAreNoContacts, IsThatOfAStepBetweenWalls) {
+/// With a wide skin all of them are candidates; without, bodies leave the reach in which these were looked
+/// for.
+void compare_with_both_skins(std::uint64_t seed, bool clumps, void (*put)(Scene&)) {
   int unseen = 0;
   for (const double skin : {0.5 * radius, 0.0}) {
-    Scene scene = flying(3, false, skin);
-    in_a_box(scene);
+    Scene scene = flying(seed, clumps, skin);
+    put(scene);
     unseen += compare(scene);
   }
   EXPECT_GT(unseen, 4);
+}
+
+TEST(OverlapOfThoseThatAreNoContacts, IsThatOfAStepBetweenWalls) {
+  compare_with_both_skins(3, false, put_in_a_box);
 }
 
 TEST(OverlapOfThoseThatAreNoContacts, IsThatOfAStepInACellThatFlows) {
-  int unseen = 0;
-  for (const double skin : {0.5 * radius, 0.0}) {
-    Scene scene = flying(4, false, skin);
-    in_a_cell(scene);
-    unseen += compare(scene);
-  }
-  EXPECT_GT(unseen, 4);
+  compare_with_both_skins(4, false, put_in_a_cell);
 }
 
 TEST(OverlapOfThoseThatAreNoContacts, IsThatOfAStepOfClumps) {
-  int unseen = 0;
-  for (const double skin : {0.5 * radius, 0.0}) {
-    Scene box = flying(5, true, skin), cell = flying(6, true, skin);
-    in_a_box(box);
-    in_a_cell(cell);
-    unseen += compare(box) + compare(cell);
-  }
-  EXPECT_GT(unseen, 4);
+  compare_with_both_skins(5, true, put_in_a_box);
+  compare_with_both_skins(6, true, put_in_a_cell);
+}
+
+// A ball that sticks to a light lid draws it down within the step, onto another that is no candidate of it.
+TEST(OverlapOfThoseThatAreNoContacts, IsThatOfALidThatComesFurtherThanItWasLookedFor) {
+  Scene scene;
+  add_sphere(scene.bodies, BodyId{0}, Vec3(0, 0, -0.8 * radius), radius, 1e6);
+  add_sphere(scene.bodies, BodyId{1}, Vec3(5 * radius, 0, -1.1 * radius), radius, 1e6);
+  scene.bodies.velocity[0].u[2] = -0.4 * radius / h;
+  Wall& lid = scene.setup.walls.emplace_back();
+  lid.name = "lid";
+  lid.normal = -Vec3::UnitZ();
+  lid.load.drive = WallDrive::force;
+  lid.load.force = 1e-9;
+  lid.load.mass = 1e-6;
+  Stage& stage = scene.setup.stages.emplace_back();
+  stage.name = "draw";
+  stage.time_step = h;
+  stage.laws = laws_of_one_material(0, 0, 0);
+  stage.laws.set_all(cohesion_attraction, 1e6);
+  stage.end.steps = 1;
+  scene.setup.detection = {.alert = 1e-3 * radius, .skin = 0};
+  scene.setup.decomposition.subdomains = 1;
+  const Claims claims = claims_of(scene, graph::one_rank(), false);
+  ASSERT_EQ(claims.named.size(), 1U);
+  EXPECT_NEAR(claims.overlap[0], 0.1, 1e-6);
+  EXPECT_EQ(claims.named[0], (BodyPair{1, -1}));
 }
 
 // A heavy ball throws a light one at another that no candidate tells of, in the last step of a run.
