@@ -111,10 +111,10 @@ FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
       least_unit_ = std::max(least_unit_, speeds * speed_of_bodies(problem, contact) / std::sqrt(normal));
   }
   q_ = q_.cwiseProduct(scale_).eval();
-  Matrix H(row_of(contacts), static_cast<Eigen::Index>(6 * grains + problem.wall_normal.size()));
-  H.setFromTriplets(entries.begin(), entries.end());
-  H = scale_.asDiagonal() * H;
-  W_ = H * Matrix(H.transpose());
+  momenta_.resize(row_of(contacts), static_cast<Eigen::Index>(6 * grains + problem.wall_normal.size()));
+  momenta_.setFromTriplets(entries.begin(), entries.end());
+  momenta_ = scale_.asDiagonal() * momenta_;
+  W_ = momenta_ * Matrix(momenta_.transpose());
   cell_ = (scale_.asDiagonal() * cell_).eval();
 }
 

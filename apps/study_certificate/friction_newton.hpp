@@ -44,6 +44,15 @@ class FrictionNewton {
   /// Of the impulses that meet the law to `enough` over `unit`, as redundant contacts leave many, those next
   /// to `run`: proximal steps about them with ever smaller shifts. False where none come out, and r stays.
   bool go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, double unit, double enough) const;
+  /// What impulses may be off by: the law over a unit, and velocities [J^1/2].
+  struct Room {
+    double law, unit, velocities;
+  };
+  /// Of all impulses under which bodies move as under `exact`, and that have the law's answer to that motion,
+  /// those nearest to `run`. That is a convex problem: a contact that moves apart has none, one that slides
+  /// has them against its slip, any other in its cone. False where it is not solved, and r stays.
+  bool keep_velocities(std::span<const Vec3> run, std::span<const Vec3> exact, const Room& room,
+                       std::vector<Vec3>& r) const;
   /// Difference of the velocities under two sets of impulses, in the kinetic norm [J^1/2].
   double apart(std::span<const Vec3> a, std::span<const Vec3> b) const;
 
@@ -73,7 +82,8 @@ class FrictionNewton {
   std::vector<std::size_t> carrier_;    ///< whose normal part bounds it: itself, or of a moment its contact
   Vector scale_, q_;                    ///< 3 per contact
   double least_unit_ = 1e-300;
-  Matrix W_;              ///< without what the cell adds, cell_ cell_^T
+  Matrix momenta_;        ///< H: from momenta of bodies over the root of mass or inertia to velocities
+  Matrix W_;              ///< H H^T, without what the cell adds, cell_ cell_^T
   Eigen::MatrixXd cell_;  ///< a column per component that follows a stress: it ties all contacts together
 };
 

@@ -32,8 +32,6 @@ struct ReferenceLimits {
   int pivots_in_cell = 60;  ///< ... of a cell, before an interior point method makes a guess
   int proximal_steps = 24;  ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
-  std::int64_t walk_solves =
-      20'000'000;  ///< friction: likewise, from the run's impulses to forces next to them
 };
 
 /// What a search has come to.

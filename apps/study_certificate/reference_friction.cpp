@@ -209,8 +209,9 @@ class Forces {
   Forces(const FrictionNewton& newton, std::span<const Vec3> run, double unit, const ReferenceLimits& limits)
       : newton_(newton), run_(run), unit_(unit), limits_(limits) {}
 
-  /// By proximal steps, and where those fail by sweeps. False where neither finds them.
-  bool take(Sweeps& sweeps, Reference& reference) const {
+  /// By proximal steps. A heavy body on light ones moves by what the law's residual hardly shows, and no
+  /// proximal step that holds redundant contacts lets it follow: there for the exact velocities.
+  bool take(Reference& reference) const {
     for (double enough = limits_.forces; enough >= limits_.residual; enough /= 10) {
       std::vector<Vec3> r;
       if (!newton_.go_next_to(run_, r, unit_, enough)) break;
@@ -218,7 +219,9 @@ class Forces {
       reference.r = r;
       return true;
     }
-    return walk(sweeps, reference);
+    const FrictionNewton::Room room{limits_.forces, unit_,
+                                    limits_.forces_velocities * reference.exchanged + reference.error};
+    return newton_.keep_velocities(run_, reference.exact, room, reference.r);
   }
 
  private:
@@ -226,27 +229,6 @@ class Forces {
   bool known(std::span<const Vec3> r, const Reference& reference) const {
     return newton_.apart(r, reference.exact) <=
            limits_.forces_velocities * reference.exchanged + reference.error;
-  }
-
-  /// A heavy body on light ones moves by what the law's residual hardly shows, and no proximal step that
-  /// holds redundant contacts lets it follow. Plain sweeps bring it on, slowly, and leave those almost where
-  /// they are. What they find is taken only where it meets the law and has the exact velocities.
-  bool walk(Sweeps& sweeps, Reference& reference) const {
-    Vector swept = joined(run_);
-    std::int64_t left = limits_.walk_solves / static_cast<std::int64_t>(2 * run_.size() + 1);
-    for (std::int64_t passes = plain_passes; left > 0; passes *= 2) {
-      sweeps.begin(swept);
-      for (std::int64_t pass = 0; pass < std::min(passes, left); ++pass) {
-        sweeps.sweep(swept, false);
-        sweeps.sweep(swept, true);
-      }
-      left -= passes;
-      std::vector<Vec3> r;
-      if (!newton_.go_next_to(parted(swept), r, unit_, limits_.forces) || !known(r, reference)) continue;
-      reference.r = r;
-      return true;
-    }
-    return false;
   }
 
   const FrictionNewton& newton_;
@@ -289,12 +271,12 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.r = reference.exact;
   const bool nearly = reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly;
   if (reference.found == Found::answer) {
-    forces.take(sweeps, reference);
+    forces.take(reference);
   } else if (const double approach = unavoidable_approach(problem, limits); approach > 0) {
     reference.found = Found::no_answer;
     reference.residual = approach;
     reference.why = "no velocities are admissible";
-  } else if (nearly && forces.take(sweeps, reference)) {
+  } else if (nearly && forces.take(reference)) {
     reference.found = Found::answer;
   } else if (nearly) {
     reference.found = Found::velocities;

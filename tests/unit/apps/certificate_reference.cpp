@@ -17,58 +17,11 @@
 #include "apps/study_certificate/scene_maker.hpp"
 #include "apps/study_certificate/study_certificate.hpp"
 #include "kernels/samples/sample.hpp"
+#include "tests/unit/apps/audited_step.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
 namespace talus::audit {
 namespace {
-
-constexpr double R = 0.01, density = 2600, h = 1e-3, g = 9.81;
-
-double mass_of(double radius) {
-  return density * 4 / 3 * std::numbers::pi * radius * radius * radius;
-}
-
-/// Grains and walls of one step, as a frame and a setup.
-struct Step {
-  Frame before;
-  Bodies bodies;
-  Setup setup;
-  Stage stage;
-
-  Step(double gravity, double friction, double restitution = 0) {
-    stage.time_step = h;
-    stage.gravity = {0, 0, -gravity};
-    stage.laws = laws_of_one_material(friction, friction, restitution);
-  }
-  void grain(const Vec3& x, double radius, const Vec3& u = Vec3::Zero()) {
-    const auto id = static_cast<std::int64_t>(before.x.size());
-    before.id.push_back(id);
-    before.x.push_back(x);
-    before.radius.push_back(radius);
-    before.u.push_back(u);
-    before.omega.push_back(Vec3::Zero());
-    add_sphere(bodies, BodyId{id}, x, radius, density);
-  }
-  Wall& wall(const Vec3& point, const Vec3& normal) {
-    Wall made;
-    made.point = point;
-    made.normal = normal.normalized();
-    return setup.walls.emplace_back(made);
-  }
-  StepProblem problem() const {
-    std::vector<double> loads;
-    for (const Wall& one : setup.walls) loads.push_back(one.load.force);
-    return rebuild_step({before, setup.walls, loads, stage, bodies, setup});
-  }
-};
-
-/// With the exact forces in place of those next to a run's.
-Reference solved(const StepProblem& problem) {
-  const std::vector<Vec3> nothing(problem.contacts.size(), Vec3::Zero());
-  Reference answer = solve_reference(problem, nothing);
-  answer.r = answer.exact;
-  return answer;
-}
 
 Step wedge(double half_angle) {
   Step step(g, 0);
@@ -141,28 +94,6 @@ TEST(CertificateReference, AGrainThrownOnAFloorSlidesBackByFrictionOrSticks) {
   }
 }
 
-TEST(CertificateReference, AsksRedundantContactsForTheirShareOnlyWhereGapsTellIt) {
-  // Two floors, the second lower by a part of g h^2: the first carries all. A run that has shared the weight
-  // is wrong, unless it takes a change of the gaps to find out that no step before has kept to.
-  for (const double friction : {0.0, 0.3})
-    for (const double lower : {1e-8, 1e-6, 1e-3}) {
-      Step step(g, friction);
-      step.grain({0, 0, R}, R);
-      step.wall(Vec3::Zero(), Vec3::UnitZ());
-      step.wall({0, 0, -lower * g * h * h}, Vec3::UnitZ());
-      const StepProblem problem = step.problem();
-      ASSERT_EQ(problem.contacts.size(), 2U);
-      const Vec3 weight(0, 0, mass_of(R) * g * h);
-      const std::vector<Vec3> shared(2, weight / 2);
-      const Reference answer = solve_reference(problem, shared);
-      ASSERT_EQ(answer.found, Found::answer) << friction << ' ' << lower;
-      const Vec3 first = lower < 1e-5 ? Vec3(weight / 2) : weight;
-      EXPECT_NEAR((answer.r[0] - first).norm() / weight.norm(), 0, 1e-3) << friction << ' ' << lower;
-      EXPECT_NEAR((answer.r[0] + answer.r[1] - weight).norm() / weight.norm(), 0, 1e-3);
-      EXPECT_LT(answer.motion.u[0].norm(), 1e-6 * g * h);
-    }
-}
-
 TEST(CertificateReference, ALightLidMeetsAGrainByItsSpeedAtTheEndOfTheStep) {
   // The load takes the lid to 1.1 m/s in the step, 0.9 of which would close the gap; the mean velocity of the
   // impact, which the problem is about, is 0.73 m/s only. The pair turns in this step.
@@ -222,19 +153,6 @@ TEST(CertificateReference, OfAGrainThatMayBeJammedOrFallTellsWhatTheRunHasFound)
     for (std::size_t c = 0; c < run.size(); ++c) EXPECT_LT((answer.r[c] - run[c]).norm(), 1e-6 * weight);
     EXPECT_NEAR(answer.motion.u[0][2], pressed > 0 ? 0 : -g * h, 1e-6 * g * h) << pressed;
   }
-}
-
-/// A pile in a corner, in motion, so that some contacts open and others close.
-Step small_pile(double friction, std::uint64_t seed) {
-  Step step(g, friction);
-  Draws draws(seed, 7);
-  const std::vector<double> radii(6, R);
-  const std::vector<Vec3> centres = deposit(radii, 5 * R, 5 * R);
-  for (const Vec3& x : centres) step.grain(x, R, Vec3(2 * g * h * draws.direction()));
-  step.wall(Vec3::Zero(), Vec3::UnitX());
-  step.wall(Vec3::Zero(), Vec3::UnitY());
-  step.wall(Vec3::Zero(), Vec3::UnitZ());
-  return step;
 }
 
 /// Velocities of the smooth problem by trying every set of contacts that carry.
