@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <exception>
 
 #include "runtime/step/simulation.hpp"
@@ -27,6 +28,24 @@ constexpr double sharpness = 0.1;
 /// Of what is asked for: what the law may leave, and what velocities may be off by, where forces are compared
 /// (ReferenceLimits::forces). The step before has left the gaps uncertain by a hundred times as much.
 constexpr double slack_of_law = 1e-2, slack_of_velocities = 1e-1;
+
+/// How far a grain may have to go for each overlap that is undone: two contacts whose normals are an angle a
+/// apart part by 1 as it moves by 1/cos(a/2), which in a narrow wedge is a long way.
+double way_out(const StepProblem& problem) {
+  double least = 1;  // cos(a/2)^2
+  const auto& contacts = problem.contacts;
+  const auto on = [](const StepContact& contact, std::size_t grain) -> double {
+    if (contact.is_moment()) return 0;
+    if (contact.first == grain) return 1;
+    return !contact.at_wall() && contact.other() == grain ? -1 : 0;
+  };
+  for (std::size_t c = 0; c < contacts.size(); ++c)
+    for (std::size_t d = 0; d < c; ++d)
+      for (const std::size_t grain : {contacts[c].first, contacts[d].first})
+        if (const double both = on(contacts[c], grain) * on(contacts[d], grain); both != 0)
+          least = std::min(least, (1 + both * contacts[c].normal.dot(contacts[d].normal)) / 2);
+  return 1 / std::sqrt(std::max(least, 1e-12));
+}
 
 /// What a step begins from.
 struct Start {
@@ -74,7 +93,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
                            step.unexplained);
     return;
   }
-  if (!(step.shift <= 1)) {
+  if (!(step.shift <= 1) && !(step.shift <= way_out(problem))) {
     step.judged = Judged::other_problem;
     step.why = fmt::format("a grain is {:.1e} times as far as velocities and overlaps take it", step.shift);
     return;
@@ -88,7 +107,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   step.why = reference.why;
   if (reference.found == Found::no_answer) step.judged = Judged::no_answer;
   if (reference.found > Found::velocities) return;
-  step.errors = true_errors(problem, reference, end);
+  step.errors = true_errors(problem, reference, end, felt_rounding(problem, reference, step.claimed, own));
   step.errors.energy = energy_gain(problem, start.before, after);
   step.forces_known = reference.found == Found::answer;
   const bool sharp = step.uncertainty <= sharpness * step.claimed;
@@ -100,7 +119,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
 
 bool AuditedRun::gave_up() const {
   if (ended.empty() || !of_run || steps.empty()) return false;
-  return !steps.back().certified || steps.back().overlapping;
+  return squeezed || !steps.back().certified || steps.back().overlapping;
 }
 
 AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
@@ -156,6 +175,9 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       run.of_run = true;
       simulation.begin_next_stage();
     }
+  } catch (const SqueezedCellError& error) {
+    run.ended = error.what();
+    run.squeezed = true;
   } catch (const std::exception& error) {
     run.ended = error.what();
   }

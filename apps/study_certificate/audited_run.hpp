@@ -43,11 +43,12 @@ struct AuditedStep {
 
 struct AuditedRun {
   std::vector<AuditedStep> steps;
-  std::string ended;    ///< "" when all steps were done; else the error that ended the run
-  bool of_run = false;  ///< it is the run's own, not one of the audit
+  std::string ended;      ///< "" when all steps were done; else the error that ended the run
+  bool of_run = false;    ///< it is the run's own, not one of the audit
+  bool squeezed = false;  ///< it is a SqueezedCellError
 
   /// It ended by itself behind a step that says that it does not hold, as where pushed walls pass one
-  /// another: the run has fooled nobody.
+  /// another, or as a stress has squeezed its cell too far: the run has fooled nobody.
   bool gave_up() const;
 };
 

@@ -80,5 +80,6 @@ void make_apart(SceneBench& bench);
 void make_touching(SceneBench& bench);
 void make_clumps(SceneBench& bench);
 void make_rolling(SceneBench& bench);
+void make_boulder(SceneBench& bench);
 
 }  // namespace talus::audit

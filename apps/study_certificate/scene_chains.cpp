@@ -171,6 +171,29 @@ void make_heavy(SceneBench& bench) {
   bench.drop(base * draws.between(0.3, 0.7), base * draws.between(0.3, 0.7), big, 0);
 }
 
+void make_boulder(SceneBench& bench) {
+  Draws& draws = bench.draws;
+  const double r = bench.radius, big = r * draws.between_decades(5, 1000);
+  const int grains = bench.draw_count(1, 25);
+  const double base = 2 * r * draws.between(1, 4);
+  bench.add_wall("z-", Vec3::Zero(), Vec3::UnitZ());
+  if (draws.chance(0.6)) bench.add_wall("x+", {base, 0, 0}, -Vec3::UnitX());
+  for (int k = 0; k < grains; ++k) {
+    const double own = bench.draw_radius();
+    bench.drop(base - own - draws.unit() * (base - 2 * own), base * draws.between(-0.5, 0.5), own, 0);
+  }
+  // It comes along the floor, or just above it, until it touches the first grain.
+  const double above = draws.chance(0.6) ? 0 : r * draws.between_decades(1e-9, 1e-2), z = big + above;
+  double place = INFINITY;
+  for (std::size_t k = 0; k < bench.count(); ++k) {
+    const Vec3& x = bench.made.grains.x[k];
+    const double reach = big + bench.made.grains.radius[k], beside = z - x[2];
+    place = std::min(place, x[0] - std::sqrt(std::max(0.0, reach * reach - beside * beside - x[1] * x[1])));
+  }
+  const double speed = draws.chance(0.5) ? 0 : bench.speed_of_fall() * draws.between_decades(1e-6, 1e-2);
+  bench.add_moving({place, 0, z}, big, speed * Vec3(draws.between(-1, 1), draws.between(-1, 1), 0));
+}
+
 namespace {
 
 /// It would be in the way of grains that are added above.

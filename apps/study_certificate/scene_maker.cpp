@@ -41,7 +41,9 @@ constexpr std::array families = {
     SceneFamily{"touching", "a column, and two grains that collide beside its top and touch it",
                 make_touching},
     SceneFamily{"clumps", "clumps of balls that lie on one another, or meet in flight", make_clumps},
-    SceneFamily{"rolling", "beams and heaps of grains that resist rolling", make_rolling}};
+    SceneFamily{"rolling", "beams and heaps of grains that resist rolling", make_rolling},
+    SceneFamily{"boulder", "a boulder of up to 1000 radii that grains lean on or roll against",
+                make_boulder}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;

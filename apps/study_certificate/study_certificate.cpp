@@ -198,8 +198,7 @@ int conclude(const Progress& progress, std::size_t scenes, const std::string& di
   say(fmt::format("calibration.csv, steps.csv, pictures and report.html in {}", directory));
   const std::vector<std::string> broken = broken_bounds(rows, {});
   for (const std::string& sentence : broken) print_error("talus: error: {}\n", sentence);
-  for (const std::string& sentence : progress.gave_up)
-    say(fmt::format("gave up, as its steps had said: {}", sentence));
+  for (const std::string& sentence : progress.gave_up) say(fmt::format("gave up: {}", sentence));
   for (const std::string& sentence : progress.ended) print_error("talus: error: {}\n", sentence);
   if (!broken.empty() || !progress.ended.empty()) return exit_failure;
   if (stop_signal() == 0) return exit_done;

@@ -18,12 +18,13 @@ struct Floors {
   double exchange = 1e-2;   ///< of the momentum exchanged: least wall impulse
   double contact = 1e-3;    ///< likewise: least contact impulse
   double load = 1e-2;       ///< of a cluster's weight in a step: least momentum it exchanges
-  double cluster = 1e-3;    ///< of a cluster's own momentum, likewise: grains that graze one another
+  double cluster = 1e-9;    ///< of a cluster's own momentum, likewise: grains that graze one another
   double elsewhere = 1e-6;  ///< of what all exchange, by the cluster's share of the mass (docs/theory.md):
                             ///< less is what the end of an earlier motion has left of it
   double held = 1e-6;       ///< of what cohesion holds with: least momentum exchanged
   double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
+  double lopsided = 100;    ///< heaviest over lightest body, beyond which the mass of all says little
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
   double corrected = 1e-7;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
   double undone = 2;        ///< of what is undone of all overlaps: how far that may shift a grain
@@ -71,9 +72,11 @@ struct Momenta {
   double all_exchanged() const { return std::accumulate(exchanged.begin(), exchanged.end(), 0.0); }
 };
 
-/// What is left of an error beyond what rounding of positions makes of it, so many times over.
-double beyond_rounding(const StepProblem& problem, double mass, double error, double times) {
-  return std::max(0.0, error - times * mass * problem.rounding_speed);
+/// What is left of an error beyond what rounding of positions makes of it, so many times over: of a mass, but
+/// no more than `felt` [N s].
+double beyond_rounding(const StepProblem& problem, double mass, double error, double times,
+                       double felt = INFINITY) {
+  return std::max(0.0, error - times * std::min(felt, mass * problem.rounding_speed));
 }
 
 /// Per grain: how many speeds that rounding makes its own may be off by. A row adds up those of its grains,
@@ -188,7 +191,40 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
 
 }  // namespace
 
-TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
+FeltRounding felt_rounding(const StepProblem& problem, const Reference& reference, double claimed,
+                           const ReferenceLimits& limits) {
+  FeltRounding felt;
+  double most = 0, lightest = INFINITY, heaviest = 0, all = 0;
+  const auto weigh = [&](double mass) {
+    lightest = std::min(lightest, mass);
+    heaviest = std::max(heaviest, mass);
+    all += mass;
+  };
+  for (const double mass : problem.mass) weigh(mass);
+  for (const double inverse : problem.wall_inv_mass)
+    if (inverse > 0) weigh(1 / inverse);
+  for (const Vec3& r : reference.r) most = std::max(most, r.norm());
+  const bool matters = floors.rounding * all * problem.rounding_speed > claimed * most;
+  if (heaviest <= floors.lopsided * lightest || !matters) return felt;
+  const std::vector<Vec3> walls = wall_impulses(problem, reference.exact, false);
+  FeltRounding found{0, 0};
+  for (const std::size_t turns : {1, 2}) {  // all gaps alike, and by turns
+    StepProblem other = problem;
+    for (std::size_t c = 0; c < other.contacts.size(); ++c)
+      other.contacts[c].bias += (c % turns == 0 ? 1 : -1) * problem.rounding_speed;
+    const Reference changed = solve_reference(other, reference.exact, limits);
+    if (changed.found != Found::answer) return felt;
+    for (std::size_t c = 0; c < changed.r.size(); ++c)
+      found.contact = std::max(found.contact, (changed.r[c] - reference.exact[c]).norm());
+    const std::vector<Vec3> at_walls = wall_impulses(other, changed.r, false);
+    for (std::size_t w = 0; w < walls.size(); ++w)
+      found.wall = std::max(found.wall, (at_walls[w] - walls[w]).norm());
+  }
+  return found;
+}
+
+TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end,
+                       const FeltRounding& felt_at) {
   TrueErrors errors;
   const double h = problem.time_step;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.r, false),
@@ -204,7 +240,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     wall_unit = std::max({wall_unit, pressed[w].norm(), h * std::abs(problem.wall_load[w])});
     felt = std::max({felt, walls[w].norm(), h * std::abs(problem.wall_load[w])});
     const double error = (walls[w] - h * end.after.walls[w].force).norm();
-    wall_wrong = std::max(wall_wrong, beyond_rounding(problem, resting[w], error, floors.rounding));
+    wall_wrong =
+        std::max(wall_wrong, beyond_rounding(problem, resting[w], error, floors.rounding, felt_at.wall));
   }
   const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
   const double load = h * problem.cell.load.cwiseAbs().maxCoeff();
@@ -223,9 +260,9 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     if (problem.contacts[c].is_moment()) continue;
     contact_unit = std::max(contact_unit, reference.r[c].norm());
-    contact_wrong =
-        std::max(contact_wrong,
-                 beyond_rounding(problem, together[c], (reference.r[c] - end.r[c]).norm(), floors.rounding));
+    const double error = (reference.r[c] - end.r[c]).norm();
+    contact_wrong = std::max(contact_wrong,
+                             beyond_rounding(problem, together[c], error, floors.rounding, felt_at.contact));
   }
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);

@@ -2,6 +2,7 @@
 
 /// How far a step is from its exact answer.
 
+#include <cmath>
 #include <optional>
 
 #include "apps/study_certificate/reference.hpp"
@@ -40,7 +41,19 @@ struct StepEnd {
 /// empty without rotation.
 std::vector<Vec3> spins_at_end(const StepProblem& problem, const Frame& after);
 
-TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end);
+/// What rounding of positions makes of impulses [N s], at most: of a contact, and of a wall. Infinite: what
+/// the mass of their cluster gains at problem.rounding_speed says how much.
+struct FeltRounding {
+  double contact = INFINITY, wall = INFINITY;
+};
+
+/// Where a body is far heavier than another, and what rounding makes of the mass of all could hide an error
+/// of what is `claimed`: by how much the exact answer changes when gaps differ by rounding.
+FeltRounding felt_rounding(const StepProblem& problem, const Reference& reference, double claimed,
+                           const ReferenceLimits& limits = {});
+
+TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end,
+                       const FeltRounding& felt_at = {});
 
 /// Largest momentum of a grain, in its motion or in its turn, that its impulses do not explain, over the
 /// largest impulse or its own momentum: rounding (frames have forces in single precision), unless the run's

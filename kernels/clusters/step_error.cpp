@@ -8,6 +8,8 @@
 
 #include "kernels/bodies/index.hpp"
 #include "kernels/clusters/cluster_problem.hpp"
+#include "kernels/clusters/felt_rounding.hpp"
+#include "kernels/clusters/group_measures.hpp"
 #include "kernels/clusters/loaded_groups.hpp"
 #include "kernels/clusters/rolling_contacts.hpp"
 #include "kernels/global/stiffness.hpp"
@@ -16,84 +18,15 @@ namespace talus {
 
 namespace {
 
-/// By Cauchy and Schwarz: the most momentum in so much energy.
-double most_momentum(double mass, double energy) {
-  return std::sqrt(mass * energy);
-}
-
-/// What a cluster, or all of them, is measured by.
-enum Measure {
-  mass,
-  incoming,
-  gained,
-  pressed,
-  grains,
-  energy,
-  pulls,
-  sums,
-  drive = sums,
-  fastest,
-  largest,
-  measures
-};
-
-using Measures = std::array<double, measures>;
-constexpr RowColumns columns_of_measures{.sums = sums, .largest = measures - sums};
-
-/// The parts of a contact's impulse that the faces across x, y and z of a cell feel: b over the edges, b from
-/// one body to the other; of blocks whose flow is given, as between the spheres that hold them.
-Vec3 face_shares(const BodyProblem& problem, const ContactEquation& c, const Vec3& faces) {
-  if (c.wall >= 0 || c.second < 0) return Vec3::Zero();
-  if (c.cell >= 0) return faces.cwiseProduct(c.branch);
-  const double between = problem.bodies[at(c.first)].radius + problem.bodies[at(c.second)].radius;
-  return faces.cwiseProduct(between * c.normal);
-}
-
-Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
-  Measures row{};
-  // What pulls as hard as it presses does nothing, and must not hide what is wrong.
-  const std::vector<Twist> free = free_of_attraction(problem),
-                           done = added(velocities_of(problem, problem.impulse), -1, free);
-  for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
-    const BodyUnknown& body = problem.bodies[b];
-    row[mass] += body.mass;
-    row[incoming] += kinetic2(body, free[b].u, free[b].w);
-    row[gained] += body.mass * done[b].u.norm() + body.spin_mass * done[b].w.norm();
-    if (body.wall || body.cell) continue;
-    row[grains] += body.mass;
-    row[energy] += 0.5 * body.mass * done[b].u.squaredNorm();
-  }
-  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    const ContactEquation& c = problem.contacts[k];
-    const Vec3& r = problem.impulse[k];
-    row[fastest] = larger(row[fastest], c.offset.norm());
-    row[largest] = larger(row[largest], r.norm());
-    row[pulls] += c.pull;
-    const double felt = std::abs(c.normal.dot(r) - c.pull);
-    if (c.wall >= 0) row[pressed] += felt;
-    row[pressed] += face_shares(problem, c, faces).norm() * felt;
-    if (r != Vec3::Zero()) row[drive] = larger(row[drive], c.drive);
-  }
-  return row;
-}
-
-/// The momentum that errors are compared with [N s]: see step_error.hpp.
-double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
-  // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
-  const double sound = most_momentum(row[mass], row[incoming]) + row[mass] * row[fastest];
-  return std::max({std::min(row[gained], sound),
-                   row[drive] > 0 ? row[mass] * row[drive] : thresholds.interest * row[pressed],
-                   thresholds.held * row[pulls],
-                   thresholds.rounding * most_momentum(row[mass], row[incoming])});
-}
-
 /// A group of bodies that push one another, and its answer.
 struct AnsweredGroup {
   LoadedGroup group;
   ClusterAnswer answer;
-  double scale = 0;  ///< what its errors are compared with [N s]
-  double floor = 0;  ///< what is done elsewhere makes of that [N s]
-  double noise = 0;  ///< what rounding leaves of its momentum [N s]
+  double scale = 0;        ///< what its errors are compared with [N s]
+  double floor = 0;        ///< what is done elsewhere makes of that [N s]
+  double noise = 0;        ///< what rounding leaves of its momentum [N s]
+  double at_wall = 0;      ///< likewise of a wall's impulse
+  FeltRounding felt = {};  ///< of its bodies and contacts, if heavy ones are not to hide light ones
 
   bool same_as(const LoadedGroup& other) const {
     return group.bodies.front() == other.bodies.front() && group.bodies.size() == other.bodies.size();
@@ -106,17 +39,26 @@ struct Everywhere {
   double mass = 0;   ///< [kg]
 };
 
-/// Sets what the errors of a group are compared with.
+/// Sets what the errors of a group are compared with. What rounding makes must pass whatever is asked.
 void measure_group(const Everywhere& everywhere, const ErrorGoal& goal, const StepErrorThresholds& thresholds,
                    AnsweredGroup& own) {
-  const Measures row = measures_of(own.group.problem, goal.faces);
+  const BodyProblem& problem = own.group.problem;
+  const Measures row = measures_of(problem, goal.faces);
   const double share = everywhere.mass > 0 ? row[mass] / everywhere.mass : 0;
-  // What rounding makes must pass whatever is asked.
-  const double still = thresholds.still * row[mass] * goal.still /
-                       std::max(goal.enough, std::numeric_limits<double>::epsilon());
+  const double enough = std::max(goal.enough, std::numeric_limits<double>::epsilon());
   own.floor = thresholds.elsewhere * everywhere.scale * share;
-  own.scale = std::max({scale_of(row, thresholds), own.floor, still});
-  own.noise = std::max(thresholds.rounding * most_momentum(row[mass], row[incoming]), still);
+  own.scale = std::max(scale_of(row, thresholds), own.floor);
+  own.noise = thresholds.rounding * most_momentum(row[mass], row[incoming]);
+  double still = thresholds.still * row[mass] * goal.still / enough;
+  if (still > own.scale && mass_ratio(problem) > thresholds.cluster.rounding_apart) {
+    own.felt =
+        felt_rounding(problem, {enough * own.scale, enough, goal.sweeps, goal.still}, thresholds.cluster);
+    still = std::min(still, own.felt.all_momentum() / enough);
+  } else {
+    own.scale = std::max(own.scale, still);
+    own.noise = std::max(own.noise, still);
+  }
+  own.at_wall = std::max(own.noise, still);
 }
 
 /// `relative`: error that need not be told apart.
@@ -138,7 +80,7 @@ std::vector<AnsweredGroup> answered(const BodyProblem& cluster, std::span<const 
     if (old != before.end() && old->same_as(group)) {
       groups.push_back(std::move(*old++));
     } else {
-      groups.push_back({std::move(group), {}});
+      groups.push_back({.group = std::move(group), .answer = {}});
       measure_group(everywhere, goal, thresholds, groups.back());
       answer_group(goal.enough, goal, thresholds, groups.back());
     }
@@ -181,7 +123,7 @@ bool join_closing(const BodyProblem& cluster, const std::vector<AnsweredGroup>& 
 void join_by_whole(const BodyProblem& cluster, const std::vector<AnsweredGroup>& groups,
                    const Everywhere& everywhere, const ErrorGoal& goal, const StepErrorThresholds& thresholds,
                    std::vector<char>& joins) {
-  AnsweredGroup whole{{cluster, {}, {}}, {}};
+  AnsweredGroup whole{.group = {cluster, {}, {}}, .answer = {}};
   measure_group(everywhere, goal, thresholds, whole);
   double least = whole.scale;
   for (const AnsweredGroup& own : groups)
@@ -279,7 +221,7 @@ class Answers {
   }
 
   double velocity_error(const AnsweredGroup& own) const {
-    const double momentum = own.answer.error;
+    const double momentum = own.answer.error - own.felt.part_of_motion(own.group.problem, own.answer.motion);
     if (!own.answer.solved) return larger(thresholds_.unknown, own.scale > 0 ? momentum / own.scale : 0);
     if (momentum == 0) return 0;
     // Where nothing moves overlaps may still ask for it.
@@ -289,7 +231,8 @@ class Answers {
   /// elsewhere, or what rounding leaves. How fast walls or a flow are says nothing of forces.
   static double contact_error(const AnsweredGroup& own) {
     double change = 0;
-    for (const Vec3& by : own.answer.found) change = larger(change, by.norm());
+    for (std::size_t k = 0; k < own.answer.found.size(); ++k)
+      change = larger(change, own.felt.beyond(k, own.answer.found[k].norm()));
     if (change == 0) return 0;
     return change / std::max({largest_impulse(own.group.problem, own.answer.found), own.floor, own.noise});
   }
@@ -297,7 +240,8 @@ class Answers {
   double least_at_walls() const {
     return largest([](const AnsweredGroup& own) {
       const auto at_wall = [](const ContactEquation& k) { return k.wall >= 0; };
-      return std::ranges::any_of(own.group.problem.contacts, at_wall) ? std::max(own.floor, own.noise) : 0.0;
+      return std::ranges::any_of(own.group.problem.contacts, at_wall) ? std::max(own.floor, own.at_wall)
+                                                                      : 0.0;
     });
   }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least

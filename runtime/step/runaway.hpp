@@ -14,6 +14,13 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A stress has squeezed a periodic cell until a body could touch two images of another (check_cell): the end
+/// of what the scene can show, and no error of its steps.
+class SqueezedCellError : public RunawayError {
+ public:
+  using RunawayError::RunawayError;
+};
+
 /// What no run that goes well reaches. Ratios have no unit.
 struct RunawayThresholds {
   /// Two walls face each other where their unit normals add up to no more than this, > 0.
@@ -24,6 +31,8 @@ struct RunawayThresholds {
   /// Kinetic energy over what loads and the motion before can give, > 1: errors within the tolerance add
   /// some.
   double most_energy = 100;
+  /// Speeds that rounding of positions makes over a step, > 0: bodies at rest may end with so many of them.
+  double rounding = 100;
 };
 
 /// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws RunawayError
@@ -31,8 +40,9 @@ struct RunawayThresholds {
 double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
-/// or the kinetic energy is far above what was supplied. `energy_free`: see free_energy_of [J].
-void check_for_runaway(const StepOutcome& outcome, double energy_free,
+/// or the kinetic energy is far above what was supplied. `energy_free`: see free_energy_of [J]. `farthest`:
+/// largest coordinate of a grain [m].
+void check_for_runaway(const StepOutcome& outcome, double energy_free, double farthest,
                        const RunawayThresholds& thresholds = {});
 
 /// Kinetic energy of pushed walls, and of a cell that follows a stress, with their free velocities, before a

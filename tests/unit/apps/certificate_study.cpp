@@ -258,6 +258,9 @@ TEST(CertificateStudy, ARunThatEndsByAnErrorHasGivenUpOnlyBehindAStepThatDoesNot
   EXPECT_TRUE(run.gave_up());
   run.steps.back() = {};
   EXPECT_TRUE(run.gave_up());
+  run.steps.back().certified = true;
+  run.squeezed = true;
+  EXPECT_TRUE(run.gave_up());
   run.ended.clear();
   EXPECT_FALSE(run.gave_up());
 }

@@ -1,0 +1,54 @@
+#include "kernels/clusters/group_measures.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "kernels/bodies/index.hpp"
+
+namespace talus {
+
+Vec3 face_shares(const BodyProblem& problem, const ContactEquation& c, const Vec3& faces) {
+  if (c.wall >= 0 || c.second < 0) return Vec3::Zero();
+  if (c.cell >= 0) return faces.cwiseProduct(c.branch);
+  const double between = problem.bodies[at(c.first)].radius + problem.bodies[at(c.second)].radius;
+  return faces.cwiseProduct(between * c.normal);
+}
+
+Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
+  Measures row{};
+  // What pulls as hard as it presses does nothing, and must not hide what is wrong.
+  const std::vector<Twist> free = free_of_attraction(problem),
+                           done = added(velocities_of(problem, problem.impulse), -1, free);
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+    const BodyUnknown& body = problem.bodies[b];
+    row[mass] += body.mass;
+    row[incoming] += kinetic2(body, free[b].u, free[b].w);
+    row[gained] += body.mass * done[b].u.norm() + body.spin_mass * done[b].w.norm();
+    if (body.wall || body.cell) continue;
+    row[grains] += body.mass;
+    row[energy] += 0.5 * body.mass * done[b].u.squaredNorm();
+  }
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const Vec3& r = problem.impulse[k];
+    row[fastest] = larger(row[fastest], c.offset.norm());
+    row[largest] = larger(row[largest], r.norm());
+    row[pulls] += c.pull;
+    const double felt = std::abs(c.normal.dot(r) - c.pull);
+    if (c.wall >= 0) row[pressed] += felt;
+    row[pressed] += face_shares(problem, c, faces).norm() * felt;
+    if (r != Vec3::Zero()) row[drive] = larger(row[drive], c.drive);
+  }
+  return row;
+}
+
+double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
+  // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
+  const double sound = most_momentum(row[mass], row[incoming]) + row[mass] * row[fastest];
+  return std::max({std::min(row[gained], sound),
+                   row[drive] > 0 ? row[mass] * row[drive] : thresholds.interest * row[pressed],
+                   thresholds.held * row[pulls],
+                   thresholds.rounding * most_momentum(row[mass], row[incoming])});
+}
+
+}  // namespace talus
