@@ -1,6 +1,7 @@
 #include "apps/study_certificate/true_errors.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -207,18 +208,28 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
   const bool matters = floors.rounding * all * problem.rounding_speed > claimed * most;
   if (heaviest <= floors.lopsided * lightest || !matters) return felt;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.exact, false);
-  FeltRounding found{0, 0};
-  for (const std::size_t turns : {1, 2}) {  // all gaps alike, and by turns
+  // Of light grains all counts, as where there are no others.
+  double light = 0;
+  for (const double mass : problem.mass) light += heaviest > floors.lopsided * mass ? mass : 0;
+  FeltRounding found{light * problem.rounding_speed, light * problem.rounding_speed};
+  // All gaps wider, all narrower, and by turns.
+  constexpr std::array<std::array<double, 2>, 4> signs{{{1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
+  for (const auto& sign : signs) {
     StepProblem other = problem;
     for (std::size_t c = 0; c < other.contacts.size(); ++c)
-      other.contacts[c].bias += (c % turns == 0 ? 1 : -1) * problem.rounding_speed;
+      other.contacts[c].bias += sign[c % 2] * problem.rounding_speed;
     const Reference changed = solve_reference(other, reference.exact, limits);
     if (changed.found != Found::answer) return felt;
+    // A row passes on what rounding makes of all its grains.
+    double moved = 0;
+    for (std::size_t k = 0; k < problem.mass.size(); ++k)
+      moved += problem.mass[k] * (changed.motion.u[k] - reference.motion.u[k]).norm();
+    found.contact = std::max(found.contact, moved);
     for (std::size_t c = 0; c < changed.r.size(); ++c)
       found.contact = std::max(found.contact, (changed.r[c] - reference.exact[c]).norm());
     const std::vector<Vec3> at_walls = wall_impulses(other, changed.r, false);
     for (std::size_t w = 0; w < walls.size(); ++w)
-      found.wall = std::max(found.wall, (at_walls[w] - walls[w]).norm());
+      found.wall = std::max({found.wall, found.contact, (at_walls[w] - walls[w]).norm()});
   }
   return found;
 }

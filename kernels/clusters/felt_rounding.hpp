@@ -20,9 +20,13 @@ struct FeltRounding {
   double part_of_motion(const BodyProblem& problem, const std::vector<Twist>& motion) const;
 };
 
+/// Whether some body is more than so many `times` as heavy as another.
+bool lopsided(const BodyProblem& problem, double times);
+
 /// How far the answer to a problem goes when its gaps differ by rounding, which changes velocities by
 /// goal.still. Where one body is far heavier than another the momentum of all of them at that speed would
-/// hide whatever the light ones do: a heavy body that they touch, and do not hold, adds nothing to it.
+/// hide whatever the light ones do: a heavy body that they touch, and do not hold, adds nothing to it. Of a
+/// body no more than its own momentum at that speed.
 /// `goal`: how exactly answers are to be known; of those that are not found nothing is taken.
 FeltRounding felt_rounding(const BodyProblem& problem, const ClusterGoal& goal,
                            const ClusterThresholds& thresholds = {});

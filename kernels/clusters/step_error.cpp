@@ -11,6 +11,7 @@
 #include "kernels/clusters/felt_rounding.hpp"
 #include "kernels/clusters/group_measures.hpp"
 #include "kernels/clusters/loaded_groups.hpp"
+#include "kernels/clusters/motion_norms.hpp"
 #include "kernels/clusters/rolling_contacts.hpp"
 #include "kernels/global/stiffness.hpp"
 
@@ -50,7 +51,7 @@ void measure_group(const Everywhere& everywhere, const ErrorGoal& goal, const St
   own.scale = std::max(scale_of(row, thresholds), own.floor);
   own.noise = thresholds.rounding * most_momentum(row[mass], row[incoming]);
   double still = thresholds.still * row[mass] * goal.still / enough;
-  if (still > own.scale && mass_ratio(problem) > thresholds.cluster.rounding_apart) {
+  if (still > thresholds.interest * own.scale && lopsided(problem, thresholds.lopsided)) {
     own.felt =
         felt_rounding(problem, {enough * own.scale, enough, goal.sweeps, goal.still}, thresholds.cluster);
     still = std::min(still, own.felt.all_momentum() / enough);
@@ -68,11 +69,23 @@ void answer_group(double relative, const ErrorGoal& goal, const StepErrorThresho
                              thresholds.cluster);
 }
 
-/// The groups of a cluster that `joins` makes; those that are as before keep their answers.
+/// Per body of a cluster: the least scale of the groups that exchange something and that it was in [N s].
+std::vector<double> least_scales(std::size_t bodies, const std::vector<AnsweredGroup>& groups) {
+  std::vector<double> least(bodies, std::numeric_limits<double>::infinity());
+  for (const AnsweredGroup& own : groups)
+    for (const std::size_t b : own.group.bodies)
+      if (own.scale > 0 && !own.group.contacts.empty()) least[b] = own.scale;
+  return least;
+}
+
+/// The groups of a cluster that `joins` makes; those that are as before keep their answers. One that others
+/// were joined to is answered as exactly as the least of them asks, if it can be: what it does in all says
+/// nothing of those that do not push one another in the end.
 std::vector<AnsweredGroup> answered(const BodyProblem& cluster, std::span<const char> joins,
                                     std::vector<AnsweredGroup> before, const Everywhere& everywhere,
                                     const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
   std::vector<AnsweredGroup> groups;
+  const std::vector<double> least = least_scales(cluster.bodies.size(), before);
   auto old = before.begin();
   for (LoadedGroup& group : loaded_groups(cluster, joins)) {
     // Both are in order of their lowest bodies, and groups only grow.
@@ -80,9 +93,12 @@ std::vector<AnsweredGroup> answered(const BodyProblem& cluster, std::span<const 
     if (old != before.end() && old->same_as(group)) {
       groups.push_back(std::move(*old++));
     } else {
-      groups.push_back({.group = std::move(group), .answer = {}});
-      measure_group(everywhere, goal, thresholds, groups.back());
-      answer_group(goal.enough, goal, thresholds, groups.back());
+      AnsweredGroup& own = groups.emplace_back(AnsweredGroup{.group = std::move(group), .answer = {}});
+      measure_group(everywhere, goal, thresholds, own);
+      double part = 1;
+      for (const std::size_t b : own.group.bodies) part = std::min(part, least[b] / own.scale);
+      answer_group(part * goal.enough, goal, thresholds, own);
+      if (!own.answer.solved && part < 1) answer_group(goal.enough, goal, thresholds, own);
     }
   }
   return groups;
@@ -133,6 +149,40 @@ void join_by_whole(const BodyProblem& cluster, const std::vector<AnsweredGroup>&
     if (cluster.impulse[k] + whole.answer.found[k] != Vec3::Zero()) joins[k] = 1;
 }
 
+/// A group without the contacts that carry nothing, neither now nor in its answer: each part has its own of
+/// that, and is measured by what it exchanges. Of what is not known of the answer each part has a share by
+/// its scale.
+void add_parts(AnsweredGroup whole, const Everywhere& everywhere, const ErrorGoal& goal,
+               const StepErrorThresholds& thresholds, std::vector<AnsweredGroup>& parts) {
+  const BodyProblem& problem = whole.group.problem;
+  const ClusterAnswer& answer = whole.answer;
+  std::vector<char> joins = carrying(problem);
+  for (std::size_t k = 0; k < joins.size(); ++k)
+    if (answer.impulse[k] != Vec3::Zero() || answer.found[k] != Vec3::Zero()) joins[k] = 1;
+  std::vector<LoadedGroup> groups = loaded_groups(problem, joins);
+  if (groups.size() == 1 || !answer.solved) return parts.push_back(std::move(whole));
+  const double unknown = std::max(0.0, answer.error - momentum_of(problem, answer.motion));
+  for (LoadedGroup& group : groups) {
+    AnsweredGroup part{.group = std::move(group), .answer = {}};
+    measure_group(everywhere, goal, thresholds, part);
+    part.answer.solved = true;
+    part.answer.helps = answer.helps;
+    for (std::size_t& b : part.group.bodies) {
+      part.answer.motion.push_back(answer.motion[b]);
+      b = whole.group.bodies[b];
+    }
+    for (std::size_t& k : part.group.contacts) {
+      part.answer.impulse.push_back(answer.impulse[k]);
+      part.answer.found.push_back(answer.found[k]);
+      if (!answer.moment.empty()) part.answer.moment.push_back(answer.moment[k]);
+      k = whole.group.contacts[k];
+    }
+    const double share = whole.scale > 0 ? std::min(1.0, part.scale / whole.scale) : 1;
+    part.answer.error = momentum_of(part.group.problem, part.answer.motion) + share * unknown;
+    parts.push_back(std::move(part));
+  }
+}
+
 /// The answers to a cluster's groups, such that no contact between two closes by more than may be.
 std::vector<AnsweredGroup> answered_groups(const BodyProblem& cluster, const Everywhere& everywhere,
                                            const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
@@ -145,7 +195,9 @@ std::vector<AnsweredGroup> answered_groups(const BodyProblem& cluster, const Eve
       std::ranges::fill(joins, char{1});
     groups = answered(cluster, joins, std::move(groups), everywhere, goal, thresholds);
   }
-  return groups;
+  std::vector<AnsweredGroup> parts;
+  for (AnsweredGroup& own : groups) add_parts(std::move(own), everywhere, goal, thresholds, parts);
+  return parts;
 }
 
 /// Where the answers of clusters come together: those that several processes hold count in one of them.
@@ -236,12 +288,14 @@ class Answers {
     if (change == 0) return 0;
     return change / std::max({largest_impulse(own.group.problem, own.answer.found), own.floor, own.noise});
   }
-  /// What is done elsewhere, or rounding, makes of the momentum of a group beside a wall: the largest [N s].
+  /// What is done elsewhere, or rounding, makes of the momentum of a group that changes a wall's impulse: the
+  /// largest [N s].
   double least_at_walls() const {
     return largest([](const AnsweredGroup& own) {
-      const auto at_wall = [](const ContactEquation& k) { return k.wall >= 0; };
-      return std::ranges::any_of(own.group.problem.contacts, at_wall) ? std::max(own.floor, own.at_wall)
-                                                                      : 0.0;
+      for (std::size_t k = 0; k < own.answer.found.size(); ++k)
+        if (own.group.problem.contacts[k].wall >= 0 && own.answer.found[k] != Vec3::Zero())
+          return std::max(own.floor, own.at_wall);
+      return 0.0;
     });
   }
   /// Changes of the impulses of walls, and of the faces of a cell, over the largest of them, at least

@@ -39,6 +39,9 @@ struct StepErrorThresholds {
   /// not be told apart is this part of it at least. What a step may be wrong by is a few times that, and
   /// whoever compares velocities to rounding of positions has as much of his own.
   double still = 0.4;
+  /// Heaviest over lightest body of a group, > 1, beyond which that momentum is not of all its mass, but what
+  /// the answer changes by (felt_rounding.hpp).
+  double lopsided = 100;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
   /// nothing of what they have not.
   double unknown = 1;
