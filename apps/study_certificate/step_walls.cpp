@@ -101,7 +101,7 @@ Twist twist_between(const Placement& from, const Placement& to, double h) {
 
 }  // namespace
 
-StepWall::StepWall(const Wall& wall, double time, double h) : wall_(wall), time_(time) {
+StepWall::StepWall(const Wall& wall, double time, double h) : wall_(wall), time_(time), h_(h) {
   if (wall.shape.name == "mesh") wall.surface()->show(triangles_);
   if (!moves()) return;
   const Placement middle = placed(h / 2);
@@ -137,9 +137,11 @@ std::vector<WallTouch> StepWall::touches(const Vec3& centre, double reach, const
   return all;
 }
 
-Vec3 StepWall::material_velocity(const Vec3& point, const Vec3& normal) const {
-  const Vec3 along = along_.at(point);
-  return rigid_.at(point) + along - along.dot(normal) * normal;
+Vec3 StepWall::material_velocity(const Vec3& point, const Vec3& normal, const Vec3& u) const {
+  const auto in_plane = [&](const Vec3& v) { return Vec3(v - v.dot(normal) * normal); };
+  const Vec3 onward = in_plane(u) + rigid_.at(point).dot(normal) * normal, there = point + h_ / 2 * onward;
+  const Vec3 turned = rigid_.at(there) - rigid_.at(point);
+  return rigid_.at(point) + in_plane(turned + along_.at(there));
 }
 
 double StepWall::speed_near(const Vec3& centre, double radius) const {

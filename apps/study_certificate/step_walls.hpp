@@ -50,9 +50,10 @@ class StepWall {
   /// Every point nearer than `reach` [m] in which a sphere touches it there.
   std::vector<WallTouch> touches(const Vec3& centre, double reach, const Placement& where) const;
   /// Velocity of its material at a point [m/s] where it touches with this normal: by the rigid motion that
-  /// carries it from the middle of the step to that of the next, and that of its surface, along it. 0 for a
-  /// wall that a load moves: its velocity is in Motion::walls.
-  Vec3 material_velocity(const Vec3& point, const Vec3& normal) const;
+  /// carries it from the middle of the step to that of the next, and that of its surface, along it. It is
+  /// that half-way to the next middle, where a sphere of velocity u takes the point along the surface, which
+  /// takes it along the normal. 0 for a wall that a load moves: its velocity is in Motion::walls.
+  Vec3 material_velocity(const Vec3& point, const Vec3& normal, const Vec3& u) const;
   /// Of the wall itself at a point, its surface apart; of one that a load moves before the step [m/s].
   Vec3 velocity_at(const Vec3& point) const { return moves() ? rigid_.at(point) : wall_.velocity; }
   /// Angular velocity of its material [rad/s].
@@ -64,7 +65,7 @@ class StepWall {
 
  private:
   Wall wall_;
-  double time_;
+  double time_, h_;
   Twist rigid_, along_;              ///< of the wall, and of its surface against it
   std::vector<Triangle> triangles_;  ///< of a mesh, in its first place
 };

@@ -122,7 +122,9 @@ void write_drift(const ChunkPhase& phase, const Vec3& n, std::size_t place, Cont
   if (contacts.vx.empty()) return;
   const auto i = at(contacts.first[place]);
   const Wall& wall = phase.in.walls[at(phase.chunks.wall[phase.chunk])];
-  Vec3 drift = wall.drift_at(phase.in.x[i] - phase.in.radius[i] * n, n);
+  const Vec3 point = phase.in.x[i] - phase.in.radius[i] * n;
+  const Eigen::Map<const Vec3> u(phase.in.velocity[i].u);
+  Vec3 drift = wall.drift_at(point, n, wall.half_way(point, n, u, phase.in.time_step));
   if (phase.in.domain.flows) drift += phase.in.domain.flow_drift(phase.in.x[i]);
   set_drift(contacts, place, drift);
 }

@@ -70,11 +70,17 @@ struct Wall {
   }
   /// How it moved from the middle of the step before to that of this one at a point c [m/s].
   Vec3 came_at(const Vec3& c) const { return motion.empty() ? velocity : came.at(c); }
-  /// What its material has beyond `velocity` at a point c of contact with this normal [m/s]: of the belt what
-  /// lies in the surface.
-  Vec3 drift_at(const Vec3& c, const Vec3& n) const {
-    const Vec3 along = belt.at(c);
+  /// What its material has beyond `velocity` at a point c of contact with this normal [m/s], of the belt what
+  /// lies in the surface. `way`: how far the contact comes until the time of which this is to be (see
+  /// half_way); where the material turns it moves otherwise there.
+  Vec3 drift_at(const Vec3& c, const Vec3& n, const Vec3& way) const {
+    const Vec3 along = belt.at(c) + (omega + belt.omega).cross(way);
     return omega.cross(c - pivot) + along - along.dot(n) * n;
+  }
+  /// Of a contact at c with a sphere whose centre has the velocity u, in half of a step h: with the sphere
+  /// along the surface, and with the surface along the normal [m].
+  Vec3 half_way(const Vec3& c, const Vec3& n, const Vec3& u, double h) const {
+    return h / 2 * (u - n.dot(u - velocity_at(c)) * n);
   }
   /// Null for a plane.
   const Surface* surface() const { return shape.surface.get(); }

@@ -130,6 +130,14 @@ bool touches_another(const NarrowPhase& in, const WallPair& pair, const Meeting&
   return at_seam(in.walls, at(pair.wall), ball.centre, ball.radius, meeting.seen);
 }
 
+/// Of the wall's material; the contact goes where the centre of its ball goes.
+Vec3 drift_of(const NarrowPhase& in, const Wall& wall, const Meeting& meeting) {
+  const Touch& touch = meeting.touch;
+  const Mat3 lever = lever_of(in, meeting.first, touch.ball.centre - in.x[at(meeting.first)]);
+  const Vec3 u = velocity_at(in, meeting.first, lever);
+  return wall.drift_at(touch.point, touch.normal, wall.half_way(touch.point, touch.normal, u, in.time_step));
+}
+
 void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t place,
            Contacts& contacts) {
   contacts.nx[place] = meeting.touch.normal[0];
@@ -174,8 +182,7 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
                   law.reach() * meeting.touch.smaller_radius);
     if (found.absent || (wall && touches_another(in, candidates.wall_pairs[k - grains], meeting))) continue;
     if (wall && !contacts.vx.empty())
-      set_drift(contacts, place,
-                in.walls[at(chunks.wall[chunk])].drift_at(meeting.touch.point, meeting.touch.normal));
+      set_drift(contacts, place, drift_of(in, in.walls[at(chunks.wall[chunk])], meeting));
     if (!wall && in.domain.flows)
       set_drift(contacts, place, in.domain.image_drift(in.x[at(meeting.first)], in.x[at(meeting.second)]));
     write(meeting, found.bias, k, place++, contacts);

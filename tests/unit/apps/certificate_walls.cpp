@@ -122,10 +122,14 @@ TEST(CertificateWalls, MoveAsThoseOfTheProgramDo) {
     EXPECT_LT((pose.turn - middle.turn).norm() + (pose.shift - middle.shift).norm(), 1e-12) << time;
     const RigidVelocity rigid = mean_velocity(wall.motion, time + h / 2, h);
     const RigidVelocity belt = mean_surface_velocity(wall.motion, time + h / 2, h, rigid.pivot);
-    const Vec3 n = Vec3(1, 1, -1).normalized(), c(0.3, -0.6, 0.2), along = belt.at(c);
-    const Vec3 expected = rigid.at(c) + along - along.dot(n) * n;
-    EXPECT_LT((own.material_velocity(c, n) - expected).norm(), 1e-10) << time;
-    EXPECT_GE(own.speed_near(c, 0.1), own.material_velocity(c + 0.1 * n, n).norm());
+    const Vec3 n = Vec3(1, 1, -1).normalized(), c(0.3, -0.6, 0.2), u(0.7, -2, 3);
+    wall.velocity = rigid.velocity;
+    wall.omega = rigid.omega;
+    wall.pivot = rigid.pivot;
+    wall.belt = belt;
+    const Vec3 expected = rigid.velocity + wall.drift_at(c, n, wall.half_way(c, n, u, h));
+    EXPECT_LT((own.material_velocity(c, n, u) - expected).norm(), 1e-10) << time;
+    EXPECT_GE(own.speed_near(c, 0.1), own.material_velocity(c + 0.1 * n, n, Vec3::Zero()).norm());
   }
 }
 

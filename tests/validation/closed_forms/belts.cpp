@@ -51,5 +51,49 @@ TEST(Conveyor, CarriesWhatDoesNotRollAtItsSpeedWhileItsFloorStays) {
   EXPECT_NEAR(run.wall_force(0)[2], 0.7 * g_earth, 1e-9);
 }
 
+/// A disc that turns about z, or whose material alone does.
+Scene on_turntable(double rate, bool rotates, bool surface_only, double step) {
+  Scene scene(step);
+  MotionPart turn;
+  turn.kind = MotionPart::Kind::rotation;
+  turn.axis = Vec3::UnitZ();
+  turn.rate = rate;
+  turn.surface_only = surface_only;
+  scene.wall("table", Vec3::Zero(), Vec3::UnitZ()).motion = {turn};
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.friction(5);
+  scene.setup.rotation = rotates;
+  return scene;
+}
+
+/// With the material's velocity where the contact is in the middle of the step, and not half-way of what it
+/// does in it, friction did work: the block went outwards by Omega^2 h/2, 5 % in the first second.
+TEST(Turntable, CarriesABlockAroundAtItsRadius) {
+  for (const bool surface_only : {false, true}) {
+    Scene scene = on_turntable(10, false, surface_only, h);
+    scene.sphere({0.1, 0, radius}, radius, 0.7, {0, 1, 0});
+    Experiment run(std::move(scene));
+    run.steps(1000);
+    EXPECT_NEAR(run.x().head<2>().norm(), 0.1, 2e-4 * 0.1) << surface_only;
+    const double angle = std::atan2(run.x()[1], run.x()[0]);
+    EXPECT_NEAR(std::remainder(angle - 10 * run.time(), 2 * pi), 0, 1e-3);
+  }
+}
+
+/// A solid ball that rolls goes in a circle, 2/7 as fast as the table turns (Earnshaw 1844).
+TEST(Turntable, RollsABallInACircle) {
+  const double rate = 10, slow = 2 * rate / 7, speed = 0.2;
+  Scene scene = on_turntable(rate, true, false, h);
+  scene.sphere({0, 0, radius}, radius, 0.7, {speed, 0, 0});
+  scene.bodies.velocity.back().w[1] = speed;  // rolls where the table does not move
+  Experiment run(std::move(scene));
+  run.steps(2000);
+  const Vec3 centre(0, speed / slow, radius);
+  EXPECT_NEAR((run.x() - centre).norm(), speed / slow, 1e-3 * speed / slow);
+  EXPECT_NEAR(run.u().norm(), speed, 1e-3 * speed);
+  const double angle = std::atan2(run.u()[1], run.u()[0]);
+  EXPECT_NEAR(std::remainder(angle - slow * run.time(), 2 * pi), 0, 1e-3);
+}
+
 }  // namespace
 }  // namespace talus::validation::closed_form_belts_test

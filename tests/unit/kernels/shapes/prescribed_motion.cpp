@@ -120,7 +120,7 @@ TEST(PrescribedMotion, SurfaceThatMovesAloneStaysAndItsMaterialMovesAlongIt) {
   wall.motion = {part, along};
   EXPECT_FALSE(pose_at(wall.motion, 3).moved);
   wall.belt = mean_surface_velocity(wall.motion, 3, 0.1, Vec3::Zero());
-  EXPECT_LT((wall.drift_at({2, 0, 0}, Vec3::UnitZ()) - Vec3(0, 3, 0)).norm(), 1e-14);
+  EXPECT_LT((wall.drift_at({2, 0, 0}, Vec3::UnitZ(), Vec3::Zero()) - Vec3(0, 3, 0)).norm(), 1e-14);
   EXPECT_EQ(wall.velocity_at({2, 0, 0}), Vec3::Zero());
   EXPECT_TRUE(wall.has_drift());
 }
