@@ -82,7 +82,14 @@ Frame frame_of(const Conversion& todo, std::size_t k) {
 void write_lammps(const Conversion& todo, const fs::path& draft) {
   std::ofstream file(draft, std::ios::binary);
   const std::size_t balls = todo.shapes.clump ? todo.shapes.clump->balls.size() : 1;
-  for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(frame_of(todo, k), balls);
+  // Readers take the columns of the first frame for those of all, and it may have no grains yet.
+  std::size_t filled = 0;
+  Frame like = frame_of(todo, filled);
+  while (like.id.empty() && ++filled < todo.frames) like = frame_of(todo, filled);
+  for (std::size_t k = 0; k < todo.frames; ++k) {
+    const Frame frame = frame_of(todo, k);
+    file << io::lammps_dump(frame, balls, frame.id.empty() ? like : frame);
+  }
   file.close();
   if (!file) throw io::FileError(draft.string(), "cannot be written: no room or no right to");
 }

@@ -79,10 +79,12 @@ trace::Trace report(const ReplayOptions& options, const trace::Timeline& timelin
         fmt::format("{}   (replay {:+.1f} %)", seconds(recorded_time),
                     100 * (played.makespan / recorded_time - 1)));
   print("work of all tasks", seconds(played.work), label);
-  print("speedup over 1 x 1",
-        fmt::format("{:.2f} of {:.0f}, {}", alone / played.makespan, workers,
-                    percent(alone / (played.makespan * workers))),
-        label);
+  // The tasks of a prediction hold what messages cost its ranks, which one rank would not pay.
+  if (!recorded.predicted)
+    print("speedup over 1 x 1",
+          fmt::format("{:.2f} of {:.0f}, {}", alone / played.makespan, workers,
+                      percent(alone / (played.makespan * workers))),
+          label);
   print("exposed messages", percent(summary.exposed / (played.makespan * workers)), label);
   print("waiting and idle", percent(summary.idle / (played.makespan * workers)), label);
   print("bound: longest chain", seconds(longest), label);

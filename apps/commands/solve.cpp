@@ -19,6 +19,7 @@
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
 #include "kernels/delassus/delassus_solve.hpp"
+#include "runtime/graph/clock.hpp"
 
 namespace talus {
 namespace {
@@ -159,11 +160,12 @@ int solve(const SolveOptions& options, const Plan& plan) {
       continue;
     }
     for (const DelassusMethod method : plan.methods) {
+      const double began = graph::seconds_now();
       Solved solved = solve_one(problem.contact, file.name, method, plan, options, [&] {
         patience.tell([&] {
-          return fmt::format("solve {} of {}: {}, {} contacts, {}, for {:g} s at most", rows.size() + 1,
+          return fmt::format("solve {} of {}: {}, {} contacts, {}, {:.0f} of {:g} s at most", rows.size() + 1,
                              plan.files.size() * plan.methods.size(), file.name, problem.contact.contacts(),
-                             name_of(method), options.max_seconds);
+                             name_of(method), graph::seconds_now() - began, options.max_seconds);
         });
       });
       if (!plan.table) print_line(solved.row);

@@ -200,6 +200,9 @@ Reference solve_reference(const Problem& problem, int threads, const Say& say, P
                   "{:.1e}{}",
                   row.step, row.bodies, row.contacts, row.method, row.sweeps, row.error_rms, row.balance,
                   row.converged ? "" : wanted));
+  if (row.contacts == 0)
+    say("warning: that step has no contacts, so that methods have nothing to solve: take a later one with "
+        "--at-step");
   Reference reference;
   for (const Vec3& force : best->wall_forces)
     reference.force_scale = std::max(reference.force_scale, force.norm());

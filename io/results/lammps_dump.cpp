@@ -11,11 +11,11 @@
 namespace talus::io {
 namespace {
 
-/// The box around the grains, zeros without any; or the periodic cell: a leaning one by the box around it and
-/// its tilts xy, xz, yz.
+/// The box around the grains, of 1 m without any; or the periodic cell: a leaning one by the box around it
+/// and its tilts xy, xz, yz.
 std::string box_of(const Frame& frame) {
   Bounds grains = grain_bounds(frame);
-  if (frame.x.empty()) grains = {Vec3::Zero(), Vec3::Zero()};
+  if (frame.x.empty()) grains = {Vec3::Zero(), Vec3::Ones()};
   const CellBox box =
       cell_box(frame.domain, grains).value_or(CellBox{grains.low, (grains.high - grains.low).asDiagonal()});
   const double xy = box.edges(0, 1), xz = box.edges(0, 2), yz = box.edges(1, 2);
@@ -35,16 +35,16 @@ std::string box_of(const Frame& frame) {
 
 }  // namespace
 
-std::string lammps_dump(const Frame& frame, std::size_t balls) {
+std::string lammps_dump(const Frame& frame, std::size_t balls, const Frame& like) {
   std::string text =
       fmt::format("ITEM: UNITS\nsi\nITEM: TIME\n{}\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{}\n{}",
                   frame.time, frame.step, frame.id.size(), box_of(frame));
   const auto out = std::back_inserter(text);
   text += balls > 1 ? "ITEM: ATOMS id mol type" : "ITEM: ATOMS id type";
   text += " radius x y z";
-  if (!frame.u.empty()) text += " vx vy vz";
-  if (!frame.omega.empty()) text += " omegax omegay omegaz";
-  if (!frame.orientation.empty()) text += " quatw quati quatj quatk";
+  if (!like.u.empty()) text += " vx vy vz";
+  if (!like.omega.empty()) text += " omegax omegay omegaz";
+  if (!like.orientation.empty()) text += " quatw quati quatj quatk";
   text += '\n';
   const auto put = [&](const Vec3& v) { fmt::format_to(out, " {} {} {}", v[0], v[1], v[2]); };
   std::int64_t ball = 0;  // of its grain

@@ -15,6 +15,10 @@ namespace talus::io {
 /// id and type are id + 1 and material + 1 of results.h5. Numbers read back to the same bits.
 /// A frame of balls (grain_balls.hpp), of which a grain has up to `balls` > 1 behind one another, has id =
 /// balls times that of the grain + 1, + 2, ... and a column mol, the grain's id + 1.
-std::string lammps_dump(const Frame& frame, std::size_t balls = 1);
+/// A frame without grains has the columns of `like`, one of the same file that has some, and a box of 1 m.
+std::string lammps_dump(const Frame& frame, std::size_t balls, const Frame& like);
+inline std::string lammps_dump(const Frame& frame, std::size_t balls = 1) {
+  return lammps_dump(frame, balls, frame);
+}
 
 }  // namespace talus::io

@@ -34,7 +34,7 @@ Hdf5Object open_checked_file(const std::string& path) {
   if (head.back() < checked)
     throw FileError(path,
                     "has no checksums of its directory, as checkpoints and traces of this Talus have: it is "
-                    "another file, or of an earlier version, or damaged");
+                    "another file (results.h5 is none of these), or of an earlier version, or damaged");
   return open_file(path);
 }
 

@@ -62,5 +62,14 @@ TEST(FrameOfBalls, GivesALammpsDumpIdsOfItsOwnAndMolecules) {
             std::string::npos);
 }
 
+TEST(LammpsDump, OfAFrameWithoutGrainsHasTheColumnsOfTheOthersAndABox) {
+  const Mixed mixed;
+  const std::string text = lammps_dump(Frame{}, 1, mixed.frame);
+  EXPECT_NE(text.find("ITEM: NUMBER OF ATOMS\n0\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("ff ff ff\n0 1\n0 1\n0 1\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("z vx vy vz omegax omegay omegaz quatw quati quatj quatk\n"), std::string::npos)
+      << text;
+}
+
 }  // namespace
 }  // namespace talus::io::ball_frames_test
