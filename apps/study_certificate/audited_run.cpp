@@ -29,22 +29,30 @@ constexpr double sharpness = 0.1;
 /// (ReferenceLimits::forces). The step before has left the gaps uncertain by a hundred times as much.
 constexpr double slack_of_law = 1e-2, slack_of_velocities = 1e-1;
 
-/// How far a grain may have to go for each overlap that is undone: two contacts whose normals are an angle a
-/// apart part by 1 as it moves by 1/cos(a/2), which in a narrow wedge is a long way.
+/// Of wedges in which a grain is in both sides: the narrowest that it still moves out of, as 1 over the
+/// cosine of half the angle of the normals. Narrower ones, as above and below in a column, no grain gets out
+/// of by itself.
+constexpr double narrowest = 40;
+
+/// How far a grain may have to go for each overlap that is undone: two sides whose normals are an angle a
+/// apart let go by 1 as it moves by 1/cos(a/2).
 double way_out(const StepProblem& problem) {
-  double least = 1;  // cos(a/2)^2
+  double most = 1;
   const auto& contacts = problem.contacts;
   const auto on = [](const StepContact& contact, std::size_t grain) -> double {
-    if (contact.is_moment()) return 0;
+    if (contact.is_moment() || contact.bias > 0) return 0;
     if (contact.first == grain) return 1;
     return !contact.at_wall() && contact.other() == grain ? -1 : 0;
   };
   for (std::size_t c = 0; c < contacts.size(); ++c)
     for (std::size_t d = 0; d < c; ++d)
       for (const std::size_t grain : {contacts[c].first, contacts[d].first})
-        if (const double both = on(contacts[c], grain) * on(contacts[d], grain); both != 0)
-          least = std::min(least, (1 + both * contacts[c].normal.dot(contacts[d].normal)) / 2);
-  return 1 / std::sqrt(std::max(least, 1e-12));
+        if (const double both = on(contacts[c], grain) * on(contacts[d], grain); both != 0) {
+          const double half =
+              std::sqrt(std::max(0.0, (1 + both * contacts[c].normal.dot(contacts[d].normal)) / 2));
+          if (half * narrowest >= 1) most = std::max(most, 1 / half);
+        }
+  return most;
 }
 
 /// What a step begins from.

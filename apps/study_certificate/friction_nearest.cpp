@@ -16,12 +16,14 @@ using Vector = Eigen::VectorXd;
 using Vec2 = Eigen::Vector2d;
 using Entries = Eigen::Matrix<double, 5, 1>;  ///< of a contact: normal, two across it, two of its moment
 
-/// Of Newton's steps on the multipliers, and halvings of each.
-constexpr int steps_of_multipliers = 200, halvings = 30;
-/// Part of the predicted decrease that a step must give.
-constexpr double decrease = 1e-4;
-/// Added to the diagonal of the Hessian, as a part of that of A A^T: redundant bodies leave it singular.
-constexpr double least_damping = 1e-9, most_damping = 1e-2;
+/// Of Newton's method on the multipliers.
+struct DualSearch {
+  int steps = 200, halvings = 30;  ///< of each step
+  double decrease = 1e-4;          ///< part of the predicted decrease that a step must give
+  /// Added to the diagonal of the Hessian, as a part of that of A A^T: redundant bodies leave it singular.
+  double least_damping = 1e-9, most_damping = 1e-2;
+};
+constexpr DualSearch search;
 
 /// What bounds a tangential impulse, or a moment, by the normal impulse: a disc, or where it slides the ray
 /// against the slip.
@@ -139,18 +141,19 @@ bool project_with_momenta(const Cones& cones, const Matrix& A, const Vector& run
   const Matrix back = A.transpose();
   Vector diagonal = Matrix(A * back).diagonal();
   for (double& one : diagonal)
-    if (one == 0) one = 1;  // a wall that does not move
+    if (one == 0) one = 1;  // walls that do not move, grains that nothing touches or turns
   Vector x = Vector::Zero(A.rows());
   Matrix D(run.size(), run.size());
-  s = cones.project(run, &D);
+  s = cones.project(run, nullptr);
   double phi = s.squaredNorm() / 2;
   const double first = (A * s - momenta).norm();
-  for (int k = 0; k < steps_of_multipliers; ++k) {
+  for (int k = 0; k < search.steps; ++k) {
     const Vector gradient = A * s - momenta;
     const double left = gradient.norm();
     if (left <= enough) return true;
+    cones.project(run + back * x, &D);
     Matrix hessian = A * D * back;
-    const double damping = std::clamp(left / first, least_damping, most_damping);
+    const double damping = std::clamp(left / first, search.least_damping, search.most_damping);
     Matrix shift(A.rows(), A.rows());
     shift.setIdentity();
     shift.diagonal() = damping * diagonal;
@@ -162,12 +165,12 @@ bool project_with_momenta(const Cones& cones, const Matrix& A, const Vector& run
     if (!dx.allFinite() || !(slope < 0)) return false;
     double part = 1;
     bool falls = false;
-    for (int halving = 0; halving < halvings && !falls; ++halving) {
+    for (int halving = 0; halving < search.halvings && !falls; ++halving) {
       const Vector there = x + part * dx;
-      s = cones.project(run + back * there, &D);
+      s = cones.project(run + back * there, nullptr);
       const double after = s.squaredNorm() / 2 - there.dot(momenta);
       // Near the end phi is known to rounding only, and its gradient better.
-      falls = after <= phi + decrease * part * slope || (A * s - momenta).norm() < 0.5 * left;
+      falls = after <= phi + search.decrease * part * slope || (A * s - momenta).norm() < 0.5 * left;
       if (falls) x = there, phi = after;
       part /= 2;
     }

@@ -210,7 +210,7 @@ class Forces {
       : newton_(newton), run_(run), unit_(unit), limits_(limits) {}
 
   /// By proximal steps. A heavy body on light ones moves by what the law's residual hardly shows, and no
-  /// proximal step that holds redundant contacts lets it follow: there for the exact velocities.
+  /// proximal step that holds redundant contacts lets it follow: there forces that keep the exact ones.
   bool take(Reference& reference) const {
     for (double enough = limits_.forces; enough >= limits_.residual; enough /= 10) {
       std::vector<Vec3> r;
@@ -221,7 +221,10 @@ class Forces {
     }
     const FrictionNewton::Room room{limits_.forces, unit_,
                                     limits_.forces_velocities * reference.exchanged + reference.error};
-    return newton_.keep_velocities(run_, reference.exact, room, reference.r);
+    std::vector<Vec3> r;
+    if (!newton_.keep_velocities(run_, reference.exact, room, r) || !known(r, reference)) return false;
+    reference.r = r;
+    return true;
   }
 
  private:

@@ -208,30 +208,30 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
   const bool matters = floors.rounding * all * problem.rounding_speed > claimed * most;
   if (heaviest <= floors.lopsided * lightest || !matters) return felt;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.exact, false);
-  // Of light grains all counts, as where there are no others.
-  double light = 0;
-  for (const double mass : problem.mass) light += heaviest > floors.lopsided * mass ? mass : 0;
-  FeltRounding found{light * problem.rounding_speed, light * problem.rounding_speed};
+  std::vector<double> at_contact(reference.exact.size(), 0.0), at_wall(walls.size(), 0.0);
   // All gaps wider, all narrower, and by turns.
   constexpr std::array<std::array<double, 2>, 4> signs{{{1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
+  bool any = false;
   for (const auto& sign : signs) {
     StepProblem other = problem;
     for (std::size_t c = 0; c < other.contacts.size(); ++c)
       other.contacts[c].bias += sign[c % 2] * problem.rounding_speed;
     const Reference changed = solve_reference(other, reference.exact, limits);
-    if (changed.found != Found::answer) return felt;
-    // A row passes on what rounding makes of all its grains.
-    double moved = 0;
-    for (std::size_t k = 0; k < problem.mass.size(); ++k)
-      moved += problem.mass[k] * (changed.motion.u[k] - reference.motion.u[k]).norm();
-    found.contact = std::max(found.contact, moved);
-    for (std::size_t c = 0; c < changed.r.size(); ++c)
-      found.contact = std::max(found.contact, (changed.r[c] - reference.exact[c]).norm());
-    const std::vector<Vec3> at_walls = wall_impulses(other, changed.r, false);
+    if (changed.found != Found::answer) continue;
+    any = true;
+    for (std::size_t c = 0; c < at_contact.size(); ++c)
+      at_contact[c] = std::max(at_contact[c], (changed.r[c] - reference.exact[c]).norm());
+    const std::vector<Vec3> pressed = wall_impulses(other, changed.r, false);
     for (std::size_t w = 0; w < walls.size(); ++w)
-      found.wall = std::max({found.wall, found.contact, (at_walls[w] - walls[w]).norm()});
+      at_wall[w] = std::max(at_wall[w], (pressed[w] - walls[w]).norm());
   }
-  return found;
+  if (!any) return felt;
+  // Of light grains all counts, as where there are no others: a row passes on what it makes of each.
+  double light = 0;
+  for (const double mass : problem.mass) light += heaviest > floors.lopsided * mass ? mass : 0;
+  for (double& one : at_contact) one += light * problem.rounding_speed;
+  for (double& one : at_wall) one += light * problem.rounding_speed;
+  return {at_contact, at_wall};
 }
 
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end,
@@ -251,8 +251,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     wall_unit = std::max({wall_unit, pressed[w].norm(), h * std::abs(problem.wall_load[w])});
     felt = std::max({felt, walls[w].norm(), h * std::abs(problem.wall_load[w])});
     const double error = (walls[w] - h * end.after.walls[w].force).norm();
-    wall_wrong =
-        std::max(wall_wrong, beyond_rounding(problem, resting[w], error, floors.rounding, felt_at.wall));
+    wall_wrong = std::max(wall_wrong,
+                          beyond_rounding(problem, resting[w], error, floors.rounding, felt_at.of_wall(w)));
   }
   const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
   const double load = h * problem.cell.load.cwiseAbs().maxCoeff();
@@ -272,8 +272,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     if (problem.contacts[c].is_moment()) continue;
     contact_unit = std::max(contact_unit, reference.r[c].norm());
     const double error = (reference.r[c] - end.r[c]).norm();
-    contact_wrong = std::max(contact_wrong,
-                             beyond_rounding(problem, together[c], error, floors.rounding, felt_at.contact));
+    contact_wrong = std::max(
+        contact_wrong, beyond_rounding(problem, together[c], error, floors.rounding, felt_at.of_contact(c)));
   }
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "apps/study_certificate/reference.hpp"
 
@@ -41,14 +42,17 @@ struct StepEnd {
 /// empty without rotation.
 std::vector<Vec3> spins_at_end(const StepProblem& problem, const Frame& after);
 
-/// What rounding of positions makes of impulses [N s], at most: of a contact, and of a wall. Infinite: what
+/// What rounding of positions makes of impulses [N s], at most: of each contact and of each wall. Empty: what
 /// the mass of their cluster gains at problem.rounding_speed says how much.
 struct FeltRounding {
-  double contact = INFINITY, wall = INFINITY;
+  std::vector<double> contacts = {}, walls = {};
+  double of_contact(std::size_t c) const { return contacts.empty() ? INFINITY : contacts[c]; }
+  double of_wall(std::size_t w) const { return walls.empty() ? INFINITY : walls[w]; }
 };
 
 /// Where a body is far heavier than another, and what rounding makes of the mass of all could hide an error
-/// of what is `claimed`: by how much the exact answer changes when gaps differ by rounding.
+/// of what is `claimed`: by how much the exact answer changes when gaps differ by rounding, as far as it is
+/// found, and what rounding makes of the light ones.
 FeltRounding felt_rounding(const StepProblem& problem, const Reference& reference, double claimed,
                            const ReferenceLimits& limits = {});
 

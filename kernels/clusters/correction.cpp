@@ -362,7 +362,9 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);
-    now.settled = now.open <= goal && now.left <= enough && converged(problem, now, goal, thresholds) &&
+    // What the law finds wrong with a light body may be what heavy ones press by, as many times as much.
+    const double law = now.open * std::max(1.0, thresholds.tolerance * apart);
+    now.settled = law <= goal && now.left <= enough && converged(problem, now, goal, thresholds) &&
                   (friction ? rounds > 1 && larger(now.moved, to_come) <= goal : stays);
     if (now.settled || now.error() < least) {
       least = now.error();

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/bodies/larger.hpp"
+
 namespace talus {
 
 namespace {
@@ -32,7 +34,7 @@ double FeltRounding::all_momentum() const {
 }
 
 double FeltRounding::beyond(std::size_t contact, double change) const {
-  return impulse.empty() ? change : std::max(0.0, change - impulse[contact]);
+  return impulse.empty() ? change : larger(0.0, change - impulse[contact]);
 }
 
 double FeltRounding::part_of_motion(const BodyProblem& problem, const std::vector<Twist>& motion) const {

@@ -51,8 +51,8 @@ struct StepErrorThresholds {
 struct StepError {
   double velocity = 0;  ///< of the worst group: sum m |V(r) - V*| over its scale
   /// Of the worst wall: its impulse, over the largest impulse of a wall, or what rounding or other groups
-  /// (StepErrorThresholds::elsewhere) make of the momentum of a group beside one; the faces of a cell are
-  /// walls.
+  /// (StepErrorThresholds::elsewhere) make of the momentum of a group that changes one; the faces of a cell
+  /// are walls.
   double wall = 0;
   double contact = 0;    ///< of the worst contact: its impulse, over the largest of its group
   PartImpulses change;   ///< of r, per part and contact, that mends it as far as answers help [N s]
@@ -89,7 +89,7 @@ struct ErrorGoal {
 /// driven, at least a hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed
 /// at rest gain nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters
 /// do, by its share of the mass, nor of what cohesion holds it with, nor than what rounding leaves of its own
-/// momentum.
+/// momentum, and where it is not lopsided of that of all its mass.
 StepError step_error(std::span<const BodyProblem> parts, const PartLink& link, const ErrorGoal& goal,
                      const StepErrorThresholds& thresholds = {});
 /// The whole problem in one part.

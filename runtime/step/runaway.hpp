@@ -14,8 +14,8 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A stress has squeezed a periodic cell until a body could touch two images of another (check_cell): the end
-/// of what the scene can show, and no error of its steps.
+/// A flow or a stress has squeezed a periodic cell until a body could touch two images of another
+/// (check_cell): the end of what the scene can show, and no error of its steps.
 class SqueezedCellError : public RunawayError {
  public:
   using RunawayError::RunawayError;
@@ -31,7 +31,7 @@ struct RunawayThresholds {
   /// Kinetic energy over what loads and the motion before can give, > 1: errors within the tolerance add
   /// some.
   double most_energy = 100;
-  /// Speeds that rounding of positions makes over a step, > 0: bodies at rest may end with so many of them.
+  /// So many times the speed that rounding of positions makes over a step count as supplied to all, > 0.
   double rounding = 100;
 };
 
