@@ -180,8 +180,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done; 1 failed; 2 bad input, nothing was written; 3 done, but a step or problem missed "
       "its\n"
       "tolerance; 75 stopped (`talus run` goes on with --resume). First run: docs/tutorial.md; files it "
-      "leaves: "
-      "docs/formats.md");
+      "leaves: docs/formats.md");
   app.failure_message(failure_message);
 
   std::vector<AddedCommand> added;

@@ -210,7 +210,8 @@ class Forces {
       : newton_(newton), run_(run), unit_(unit), limits_(limits) {}
 
   /// By proximal steps. A heavy body on light ones moves by what the law's residual hardly shows, and no
-  /// proximal step that holds redundant contacts lets it follow: there forces that keep the exact ones.
+  /// proximal step that holds redundant contacts lets it follow: there those forces that keep the exact
+  /// velocities.
   bool take(Reference& reference) const {
     for (double enough = limits_.forces; enough >= limits_.residual; enough /= 10) {
       std::vector<Vec3> r;

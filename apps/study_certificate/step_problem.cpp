@@ -340,7 +340,7 @@ class Builder {
                           touch.normal,
                           0,
                           pair.friction,
-                          wall.material_velocity(point, touch.normal, centre_velocity(ball))};
+                          wall.material_velocity(point, touch.normal, in_.before.u[i])};
       give_levers(contact, ball, point);
       const double gap = touch.distance - ball.radius,
                    v_n = touch.normal.dot(velocity_before(contact) - of_wall - contact.drift);

@@ -51,7 +51,7 @@ class StepWall {
   std::vector<WallTouch> touches(const Vec3& centre, double reach, const Placement& where) const;
   /// Velocity of its material at a point [m/s] where it touches with this normal: by the rigid motion that
   /// carries it from the middle of the step to that of the next, and that of its surface, along it. It is
-  /// that half-way to the next middle, where a sphere of velocity u takes the point along the surface, which
+  /// that half-way to the next middle, where a body of velocity u takes the point along the surface, which
   /// takes it along the normal. 0 for a wall that a load moves: its velocity is in Motion::walls.
   Vec3 material_velocity(const Vec3& point, const Vec3& normal, const Vec3& u) const;
   /// Of the wall itself at a point, its surface apart; of one that a load moves before the step [m/s].

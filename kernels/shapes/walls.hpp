@@ -77,8 +77,8 @@ struct Wall {
     const Vec3 along = belt.at(c) + (omega + belt.omega).cross(way);
     return omega.cross(c - pivot) + along - along.dot(n) * n;
   }
-  /// Of a contact at c with a sphere whose centre has the velocity u, in half of a step h: with the sphere
-  /// along the surface, and with the surface along the normal [m].
+  /// Of a contact at c with a body whose centre of mass has the velocity u, in half of a step h: with the
+  /// body along the surface, and with the surface along the normal [m].
   Vec3 half_way(const Vec3& c, const Vec3& n, const Vec3& u, double h) const {
     return h / 2 * (u - n.dot(u - velocity_at(c)) * n);
   }

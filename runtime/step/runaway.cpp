@@ -75,8 +75,7 @@ double cohesive_energy(const StepOutcome& outcome) {
 
 }  // namespace
 
-void check_for_runaway(const StepOutcome& outcome, double energy_free, double farthest,
-                       const RunawayThresholds& thresholds) {
+void check_for_runaway(const StepOutcome& outcome, double energy_free, const RunawayThresholds& thresholds) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
   const MotionSums& motion = sums.motion;
   if (result.diverged)
@@ -100,11 +99,9 @@ void check_for_runaway(const StepOutcome& outcome, double energy_free, double fa
     fastest_wall2 = std::max({fastest_wall2, state.walls[w].load.velocity.squaredNorm(), speed * speed});
   }
   const double energy = motion.energy.translation + motion.energy.rotation;
-  const double rounded =
-      thresholds.rounding * std::numeric_limits<double>::epsilon() * farthest / parameters.time_step;
-  const double supplied = motion.energy_free + energy_free + cohesive_energy(outcome) +
-                          sample.total_mass * (fastest_wall2 + 0.5 * rounded * rounded);
-  if (energy > thresholds.most_energy * supplied && energy > 0)
+  const double supplied =
+      motion.energy_free + energy_free + sample.total_mass * fastest_wall2 + cohesive_energy(outcome);
+  if (!result.converged && energy > thresholds.most_energy * supplied && energy > 0)
     throw RunawayError(
         fmt::format("{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "
                     "Reduce the time step or raise solver.max_iterations",

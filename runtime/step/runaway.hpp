@@ -31,8 +31,6 @@ struct RunawayThresholds {
   /// Kinetic energy over what loads and the motion before can give, > 1: errors within the tolerance add
   /// some.
   double most_energy = 100;
-  /// So many times the speed that rounding of positions makes over a step count as supplied to all, > 0.
-  double rounding = 100;
 };
 
 /// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws RunawayError
@@ -40,9 +38,10 @@ struct RunawayThresholds {
 double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
-/// or the kinetic energy is far above what was supplied. `energy_free`: see free_energy_of [J]. `farthest`:
-/// largest coordinate of a grain [m].
-void check_for_runaway(const StepOutcome& outcome, double energy_free, double farthest,
+/// or a step that missed its tolerance has far more kinetic energy than was supplied. (One that is certified
+/// has what its loads make: of a narrow wedge that a wall closes grains come far faster than the wall, and at
+/// rest rounding of positions is all the motion there is.) `energy_free`: see free_energy_of [J].
+void check_for_runaway(const StepOutcome& outcome, double energy_free,
                        const RunawayThresholds& thresholds = {});
 
 /// Kinetic energy of pushed walls, and of a cell that follows a stress, with their free velocities, before a

@@ -81,7 +81,7 @@ const StepReport& Simulation::step() {
   const double energy_free = free_energy_of(impl_->state);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
-  check_for_runaway(outcome, energy_free, impl_->graph.loop().problem().farthest());
+  check_for_runaway(outcome, energy_free);
   const DeepestOverlap overlap = find_deepest_overlap(
       impl_->state, {outcome.sums.contacts.deepest, outcome.sums.bodies_beyond, outcome.sums.walls_beyond},
       impl_->setup.solver.overlap_tolerance, impl_->ranks);

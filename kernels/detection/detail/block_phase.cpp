@@ -130,11 +130,11 @@ bool touches_another(const NarrowPhase& in, const WallPair& pair, const Meeting&
   return at_seam(in.walls, at(pair.wall), ball.centre, ball.radius, meeting.seen);
 }
 
-/// Of the wall's material; the contact goes where the centre of its ball goes.
+/// Of the wall's material; all contacts of a clump go where its centre goes, so that what turns with the wall
+/// in several points need not change its shape.
 Vec3 drift_of(const NarrowPhase& in, const Wall& wall, const Meeting& meeting) {
   const Touch& touch = meeting.touch;
-  const Mat3 lever = lever_of(in, meeting.first, touch.ball.centre - in.x[at(meeting.first)]);
-  const Vec3 u = velocity_at(in, meeting.first, lever);
+  const Eigen::Map<const Vec3> u(in.velocity[at(meeting.first)].u);
   return wall.drift_at(touch.point, touch.normal, wall.half_way(touch.point, touch.normal, u, in.time_step));
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "apps/study_certificate/friction_newton.hpp"
 #include "tests/unit/apps/audited_step.hpp"
 
@@ -69,14 +71,32 @@ TEST(CertificateForces, OfColumnsUnderAHeavyLidAreTheRunsAndEachGivesAsMuchOfWha
   }
 }
 
-/// Over the mobility of a contact of equal spheres with one another or with a fixed wall: in this norm forces
-/// are near one another.
+/// Per contact: the relative velocity that its own unit impulse makes, along the normal and across it [1/kg].
+/// A moment of rolling resistance has no normal part.
+std::vector<std::array<double, 2>> mobilities(const StepProblem& problem) {
+  std::vector<std::array<double, 2>> all;
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+    const StepContact& contact = problem.contacts[c];
+    const auto answers = [&](const Vec3& way) {
+      std::vector<Vec3> r(problem.contacts.size(), Vec3::Zero());
+      r[c] = way;
+      const Vec3 v = relative_velocity(contact, motion_under(problem, r));
+      return (v - relative_velocity(contact, problem.free)).dot(way);
+    };
+    all.push_back(
+        {contact.is_moment() ? 0 : answers(contact.normal), answers(contact.normal.unitOrthogonal())});
+  }
+  return all;
+}
+
+/// Of impulses, in the norm in which they are near one another.
 double product(const StepProblem& problem, std::span<const Vec3> a, std::span<const Vec3> b) {
   double sum = 0;
+  const std::vector<std::array<double, 2>> mobility = mobilities(problem);
   for (std::size_t c = 0; c < a.size(); ++c) {
     const Vec3& n = problem.contacts[c].normal;
-    const double bodies = problem.contacts[c].at_wall() ? 1 : 2, normal = a[c].dot(n) * b[c].dot(n);
-    sum += bodies / mass_of(R) * (normal + 3.5 * (a[c].dot(b[c]) - normal));
+    const double normal = a[c].dot(n) * b[c].dot(n);
+    sum += mobility[c][0] * normal + mobility[c][1] * (a[c].dot(b[c]) - normal);
   }
   return sum;
 }
@@ -85,8 +105,10 @@ TEST(CertificateForces, ThatKeepTheVelocitiesAreTheNearestOfAll) {
   // What is nearest in a convex set sees no other member of it at less than a right angle from the run's.
   const double impulse = mass_of(R) * g * h;
   int moved = 0;
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const StepProblem problem = small_pile(seed < 6 ? 0.3 : 0, seed).problem();
+  for (std::uint64_t seed = 1; seed <= 9; ++seed) {
+    Step step = small_pile(seed == 6 ? 0 : 0.3, seed);
+    if (seed > 6) step.stage.laws.set_all(&PairLaw::rolling_resistance, 0.2);
+    const StepProblem problem = step.problem();
     const Reference answer = solved(problem);
     const FrictionNewton newton(problem, 1e-4);
     const FrictionNewton::Room room{1e-6, newton.unit(answer.exact), 1e-9 * answer.exchanged};
@@ -94,7 +116,12 @@ TEST(CertificateForces, ThatKeepTheVelocitiesAreTheNearestOfAll) {
     Draws draws(seed, 3);
     for (int k = 0; k < 6; ++k) {
       runs.push_back(answer.exact);
-      for (Vec3& r : runs.back()) r += impulse * draws.direction();
+      for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+        const StepContact& contact = problem.contacts[c];
+        Vec3 more = impulse * draws.direction();
+        if (contact.is_moment()) more -= more.dot(contact.normal) * contact.normal;
+        runs.back()[c] += more;
+      }
       ASSERT_TRUE(newton.keep_velocities(runs.back(), answer.exact, room, near.emplace_back()));
       EXPECT_LT(newton.apart(near.back(), answer.exact), 1e-8 * answer.exchanged);
     }

@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/validation/experiment.hpp"
+#include "tests/validation/clump_scenes.hpp"
 
 namespace talus::validation::closed_form_belts_test {
 namespace {
 
-constexpr double h = 1e-3, radius = 0.01;  // [s], [m]
+constexpr double radius = 0.01;  // [m]; h is that of the clumps' scenes
 
 MotionPart belt(const Vec3& velocity) {
   MotionPart part;
@@ -54,10 +54,7 @@ TEST(Conveyor, CarriesWhatDoesNotRollAtItsSpeedWhileItsFloorStays) {
 /// A disc that turns about z, or whose material alone does.
 Scene on_turntable(double rate, bool rotates, bool surface_only, double step) {
   Scene scene(step);
-  MotionPart turn;
-  turn.kind = MotionPart::Kind::rotation;
-  turn.axis = Vec3::UnitZ();
-  turn.rate = rate;
+  MotionPart turn = rotation_part(Vec3::UnitZ(), Vec3::Zero(), rate);
   turn.surface_only = surface_only;
   scene.wall("table", Vec3::Zero(), Vec3::UnitZ()).motion = {turn};
   scene.stage().gravity = {0, 0, -g_earth};
@@ -78,6 +75,26 @@ TEST(Turntable, CarriesABlockAroundAtItsRadius) {
     const double angle = std::atan2(run.x()[1], run.x()[0]);
     EXPECT_NEAR(std::remainder(angle - 10 * run.time(), 2 * pi), 0, 1e-3);
   }
+}
+
+/// Three balls in a triangle that lie on the table cannot roll: they turn with it.
+TEST(Turntable, CarriesAClumpAround) {
+  const double rate = 5, reach = 0.1, side = 2 * radius / std::sqrt(3.0);
+  const Ball balls[] = {
+      {{side, 0, 0}, radius}, {{-side / 2, radius, 0}, radius}, {{-side / 2, -radius, 0}, radius}};
+  const PlacedClump placed = make_clump(balls);
+  Scene scene = on_turntable(rate, true, false, h);
+  scene.setup.clumps.push_back(placed.clump);
+  add_clump(
+      scene.bodies, scene.setup.clumps, 1, BodyId{0},
+      {{reach, 0, radius}, placed.orientation, placed.radius, 2500, {0, rate * reach, 0}, {0, 0, rate}});
+  Experiment run(std::move(scene));
+  run.steps(1000);
+  EXPECT_NEAR(run.x().head<2>().norm(), reach, 2e-4 * reach);
+  EXPECT_NEAR(run.x()[2], radius, 1e-4 * radius);
+  EXPECT_NEAR((omega_of(run, 0) - Vec3(0, 0, rate)).norm(), 0, 1e-3 * rate);
+  const double angle = std::atan2(run.x()[1], run.x()[0]);
+  EXPECT_NEAR(std::remainder(angle - rate * run.time(), 2 * pi), 0, 1e-3);
 }
 
 /// A solid ball that rolls goes in a circle, 2/7 as fast as the table turns (Earnshaw 1844).
