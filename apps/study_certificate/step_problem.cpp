@@ -12,53 +12,18 @@
 #include <unordered_map>
 #include <vector>
 
+#include "apps/study_certificate/step_gaps.hpp"
 #include "apps/study_certificate/touch_shapes.hpp"
 
 namespace talus::audit {
 
 namespace {
 
-/// Numbers that decide which pairs are contacts. E: 0 with Newton's law, else the largest restitution.
-struct GapNumbers {
-  double h, alert, turning, slow, E;
-};
-
-/// Whether bodies carry in the run, where their gap may be rounding and does not tell; `gap_tells` elsewhere.
-enum class InRun { gap_tells, carry, do_not };
-
-/// A pair on its way through the step.
-struct Approach {
-  double gap;     ///< in the middle of the step [m]
-  double v_n;     ///< before the step [m/s]
-  double v_free;  ///< at its end without contacts [m/s]
-  InRun in_run;
-};
-
 /// Bodies that attract one another touch up to this gap, over the smaller radius.
 constexpr double reach_of_cohesion = 1e-3;
 
 /// Roundings of the largest coordinate that a gap may be of.
 constexpr double roundings_of_gap = 4;
-
-/// Whether the pair is a contact; then its bias (docs/theory.md, "Gap term and restitution"). `reach` [m] of
-/// cohesion.
-bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double reach, double& bias) {
-  if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
-  bias = std::max(0.0, pair.gap) / numbers.h;
-  if (restitution > 0 && (numbers.slow == 0 || std::abs(pair.v_n) > numbers.slow)) {
-    // An elastic pair that touches is a contact, and one that nearly does is none.
-    const bool apart = pair.in_run == InRun::do_not && restitution >= 1 && pair.v_n >= 0;
-    if (apart && pair.gap <= 0) return false;
-    const bool closes = pair.v_n < 0 && pair.gap + numbers.h * pair.v_free < 0;
-    if (pair.gap <= 0 || pair.in_run == InRun::carry || (closes && pair.gap < numbers.turning))
-      bias = restitution * pair.v_n;
-    else if (closes || (restitution >= 1 && pair.gap > reach))
-      return false;
-  }
-  // Moreau's law: of the mean velocity (v + E v-)/(1 + E).
-  if (numbers.E > 0) bias = std::max(0.0, bias - numbers.E * pair.v_n) / (1 + numbers.E);
-  return true;
-}
 
 /// What rebuild_step works with.
 class Builder {
@@ -157,11 +122,17 @@ class Builder {
 
   const PairLaw& law(Material a, Material b) const { return in_.stage.laws.between(a, b); }
 
+  /// Gaps that may be rounding [m].
+  double rounding() const { return roundings_of_gap * made_.rounding_speed * numbers_.h; }
+
   /// StepInput::after, of a grain and another body: the other grain's id, or -1 - w of a wall.
-  InRun in_run(double gap, std::size_t k, std::int64_t other) const {
-    if (std::abs(gap) > roundings_of_gap * made_.rounding_speed * numbers_.h) return InRun::gap_tells;
+  bool carries(std::size_t k, std::int64_t other) const {
     const std::int64_t id = in_.before.id[k];
-    return carry_.contains({id, other}) || carry_.contains({other, id}) ? InRun::carry : InRun::do_not;
+    return carry_.contains({id, other}) || carry_.contains({other, id});
+  }
+  InRun in_run(double gap, std::size_t k, std::int64_t other) const {
+    if (std::abs(gap) > rounding()) return InRun::gap_tells;
+    return carries(k, other) ? InRun::carry : InRun::do_not;
   }
 
   /// A ball of a body, in the middle of the step; of a sphere it is the sphere.
@@ -215,9 +186,10 @@ class Builder {
     const double reach = held.reach * std::min(one.radius, other.radius);
     const Vec3 way = numbers_.h * (centre_velocity(one) - centre_velocity(other) - cell.rates * k);
     const double v_n = normal.dot(velocity_before(contact) - cell.rates * k),
-                 gap = gap_on_the_way(normal, apart_by, d, {way, way, reach});
-    const InRun carries = in_run(gap, i, in_.before.id[j]);
-    if (!meets(numbers_, {gap, v_n, v_n, carries}, pair.restitution, reach, contact.bias)) return;
+                 gap = gap_on_the_way(normal, apart_by, d,
+                                      {way, reach, rounding(), carries(i, in_.before.id[j])});
+    const InRun run = in_run(gap, i, in_.before.id[j]);
+    if (!meets(numbers_, {gap, v_n, v_n, run}, pair.restitution, reach, contact.bias)) return;
     contact.pull = gap <= reach ? acts_ * held.force : 0;
     made_.contacts.push_back(contact);
     const double R = in_.before.radius[i], S = in_.before.radius[j];
@@ -344,8 +316,8 @@ class Builder {
       give_levers(contact, ball, point);
       const double gap = touch.distance - ball.radius,
                    v_n = touch.normal.dot(velocity_before(contact) - of_wall - contact.drift);
-      const InRun carries = in_run(gap, i, -1 - static_cast<std::int64_t>(w));
-      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), carries}, pair.restitution, reach,
+      const InRun run = in_run(gap, i, -1 - static_cast<std::int64_t>(w));
+      if (!meets(numbers_, {gap, v_n, v_n + touch.normal.dot(gained), run}, pair.restitution, reach,
                  contact.bias) ||
           stands_on_another(walls_, placed_, w, at, ball.radius, seen))
         continue;

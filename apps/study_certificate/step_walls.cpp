@@ -290,16 +290,4 @@ WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& c
   return same;
 }
 
-double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Way& way) {
-  const double along = normal.dot(way.before);
-  const Vec3 aside = way.before - along * normal;
-  if (!(gap > way.held && gap + along < 0 && aside.norm() > Following{}.bends * d.norm())) return gap;
-  // By how far the line of the way passes the other centre, where that lies on it.
-  const double length = way.before.norm(), before = -d.dot(way.before) / length;
-  const double nearest =
-      before < length ? (d + before / length * way.before).norm() : (d + way.before).norm();
-  const double touching = d.norm() - gap;
-  return nearest > touching ? nearest - touching - along : gap;
-}
-
 }  // namespace talus::audit

@@ -91,9 +91,4 @@ struct Way {
 WallTouch on_the_way(const StepWall& wall, const Placement& where, const Vec3& centre, double radius,
                      const Way& way, const WallTouch& touch);
 
-/// Of two spheres that would use up their gap and turn about one another, the gap that leads along `normal`
-/// to where they are nearest on their way; else `gap` [m]. `d`: between their centres, along the normal;
-/// `way`: what it changes by [m].
-double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Way& way);
-
 }  // namespace talus::audit

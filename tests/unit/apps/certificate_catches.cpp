@@ -61,6 +61,16 @@ TEST(CertificateAudit, OfColumnsUnderAHeavyLidFindsThoseThatCarryIt) {
   }
 }
 
+TEST(CertificateAudit, OfAGrainThatGrazesAnotherByRoundingFollowsTheRun) {
+  // In step 5 a grain at 1.2 m/s passes one of 8 mm by its very radius: a rounding decides whether they meet.
+  const AuditedRun run = audited(make_scene("touching", 81354, {}), 8);
+  EXPECT_GE(within_their_claims(run), 4);
+  // A column at rest without weight, in 31 parts: gaps of 10^-15 m close under what rounding adds to others.
+  MadeScene column = make_scene("touching", 81387, {});
+  column.scene.setup.decomposition.subdomains = 31;
+  EXPECT_GE(within_their_claims(audited(column, 16)), 10);
+}
+
 TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDeceived) {
   // In step 2 rows of five grains, which lean by 10^-4, still close by 10^-7 m/s where others part by 10^-2.
   MadeScene made = make_scene("lattice", 1036, {});
