@@ -177,6 +177,11 @@ int partition_command(const PartitionCommandOptions& options) {
     scene = io::load_scene(options.scene, options.overrides);
     const Sample sample = place_sample(scene).sample;
     append(sample, bodies);
+    if (bodies.size() == 0)
+      throw io::error_in(
+          scene, "",
+          "no grain is there at the beginning, all are inserted: there is nothing to cut. Take "
+          "a frame of a run of it as a sample ([sample] kind = \"state\")");
     if (directory.empty()) directory = "out/partition-" + scene.name;
     check_boxes(scene.setup.decomposition, options.subdomains, kinds);
     lock.emplace(

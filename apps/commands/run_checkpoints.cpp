@@ -65,6 +65,7 @@ std::string text_of(const RunMemory& memory) {
   const io::NumberWriter write;
   each_number_of(memory, write);
   write("jammed", memory.tally.jammed);
+  write("locked", memory.tally.locked);
   write("unanswered", memory.tally.unanswered);
   const BodyPair deepest = memory.tally.deepest.overlapping.value_or(BodyPair{});
   write("deepest_pair", std::vector<std::int64_t>{deepest.body, deepest.with});
@@ -88,6 +89,7 @@ RunMemory read_memory(const std::string& text, const std::string& file) {
   RunMemory memory;
   each_number_of(memory, read);
   read("jammed", memory.tally.jammed);
+  if (read.has("locked")) read("locked", memory.tally.locked);              // since 30 November 2026
   if (read.has("unanswered")) read("unanswered", memory.tally.unanswered);  // since 28 November 2026
   std::vector<std::int64_t> deepest, furthest, bytes, crcs;
   std::vector<std::string> files;

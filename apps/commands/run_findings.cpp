@@ -60,6 +60,13 @@ void add_misses(const Simulation& simulation, const Tally& tally, Findings& all)
         "in {} the error stood still above the tolerance, at {:.2g} at worst; more sweeps do not help, so "
         "they ended there. Raise solver.tolerance above it, reduce time_step, or try another solver.method",
         steps_of(tally.stagnated), tally.floor));
+  if (tally.locked > 0)
+    all.push_back(fmt::format(
+        "in {} walls close on grains that friction does not let get away, as a wedge that is narrower than "
+        "twice the angle of friction holds what is in it: a solution was not found, and may not exist. "
+        "Push such walls with a force instead of a velocity, leave more room or less than a grain between "
+        "them, lower the friction there, or slow them down",
+        steps_of(tally.locked)));
   if (tally.jammed == 0) return;
   const bool newton = simulation.setup().solver.restitution_law == RestitutionLaw::newton;
   all.push_back(fmt::format(

@@ -26,6 +26,8 @@ void Tally::add(const Simulation& simulation) {
   }
   if (simulation.iterations().jammed)
     ++jammed;
+  else if (simulation.iterations().locked && !report.converged)
+    ++locked;
   else if (simulation.iterations().unanswered && !report.converged)
     ++unanswered;
   worst_error = larger(worst_error, report.error_rms);
@@ -63,12 +65,13 @@ void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
   summary.worst_velocity_error = worst_velocity;
   summary.worst_penetration = worst_penetration;
   summary.overlapping_steps = overlapped;
+  summary.impossible_steps = jammed + locked;
   summary.worst_overlap = worst_overlap;
   summary.sufficient_time_step = enough_time_step();
 }
 
 std::optional<double> Tally::enough_time_step() const {
-  if (sufficient_time_step == 0 || jammed > 0 || passed > 0) return std::nullopt;
+  if (sufficient_time_step == 0 || jammed > 0 || locked > 0 || passed > 0) return std::nullopt;
   return sufficient_time_step;
 }
 
@@ -139,9 +142,14 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
 
 /// Overlaps are a matter of the time step alone.
 std::string remedy_of_misses(const io::Summary& summary) {
-  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
   std::string remedy = "Raise solver.max_iterations, reduce time_step";
-  if (overlaps_alone) remedy = "Reduce time_step";
+  if (summary.impossible_steps > 0)
+    remedy = fmt::format(
+        "Of {} neither sweeps nor a shorter time_step mend what walls that close on grains do: give these "
+        "room",
+        summary.impossible_steps);
+  else if (summary.unconverged_steps == summary.overlapping_steps)
+    remedy = "Reduce time_step";
   if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
   return remedy;
 }
@@ -197,9 +205,15 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
   if (summary.worst_velocity_error > solver.balance_tolerance)
     terminal.say(
         "velocities of clusters too large for a direct solve: estimated to be within {:.2g} of what contacts "
-        "change in them in a step, with friction of the largest wall force if that is less, at worst "
-        "(`velocity_error` in steps.csv); solver.velocity_tolerance bounds it",
-        summary.worst_velocity_error);
+        "change in them in a step, with friction of the largest wall force if that is less, at worst{} "
+        "(`velocity_error` in steps.csv){}",
+        summary.worst_velocity_error,
+        summary.worst_velocity_error < CertificateThresholds{}.all_wrong ? ""
+                                                                         : ": there nothing is known of them",
+        solver.velocity_tolerance > 0
+            ? ""
+            : "; with friction that is often ten times what is wrong, and no step is swept longer for it: "
+              "solver.velocity_tolerance, where it is set, bounds it");
   terminal.say("results in {}", directory);
 }
 

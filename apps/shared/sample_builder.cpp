@@ -51,11 +51,10 @@ void demand_memory(const io::Scene& scene, double grains) {
   constexpr double bytes_made = 100, bytes_run = 1260;
   const double there = bytes_there();
   if (grains * bytes_made > there)
-    throw io::SceneError(
-        scene.source_file, 0, "sample",
-        fmt::format("{:.3g} grains take about {:.3g} GB to make and {:.3g} GB to run; this "
-                    "machine has {:.3g} GB. Ask for fewer",
-                    grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
+    throw io::error_in(scene, "sample",
+                       fmt::format("{:.3g} grains take about {:.3g} GB to make and {:.3g} GB to run; this "
+                                   "machine has {:.3g} GB. Ask for fewer",
+                                   grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
 }
 
 std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double>& radii,
@@ -88,10 +87,10 @@ std::vector<Vec3> sites_in_region(const io::Scene& scene, const io::SampleSpec& 
       spec.count > 0 ? static_cast<std::size_t>(spec.count) : static_cast<std::size_t>(most_grains);
   std::vector<Vec3> sites = lattice_in(*spec.region, largest, spacing, most);
   if (spec.count > 0 && sites.size() < most)
-    throw io::SceneError(scene.source_file, 0, path,
-                         fmt::format("the region has {} sites for {} grains; make it larger, or leave count "
-                                     "out",
-                                     sites.size(), spec.count));
+    throw io::error_in(scene, path,
+                       fmt::format("the region has {} sites for {} grains; make it larger, or leave count "
+                                   "out",
+                                   sites.size(), spec.count));
   return sites;
 }
 
@@ -110,7 +109,7 @@ std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std
     return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)},
                    stand);
   } catch (const std::invalid_argument& error) {
-    throw io::SceneError(scene.source_file, 0, fmt::format("sample[{}].count", k), error.what());
+    throw io::error_in(scene, fmt::format("sample[{}].count", k), error.what());
   }
 }
 
@@ -234,8 +233,8 @@ void demand_memory_of_graph(const io::Scene& scene, int ranks) {
   const double subdomains = scene.setup.decomposition.subdomains, there = bytes_there();
   const double needed = bytes_of_pair * subdomains * subdomains / ranks;
   if (needed > there)
-    throw io::SceneError(
-        scene.source_file, 0, "decomposition.subdomains",
+    throw io::error_in(
+        scene, "decomposition.subdomains",
         fmt::format(
             "the graph of a step of {} subdomains takes about {:.3g} GB a rank; this machine has {:.3g} "
             "GB. Ask for fewer, which hold some hundred grains each or more",
@@ -272,8 +271,12 @@ Sample build_sample(const io::Scene& scene, std::optional<Sample> state) {
 std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   Overlaps overlaps;
   const auto id = [&](std::size_t k) { return static_cast<std::int64_t>(sample.id_of(k)); };
-  // Samples that are made have none between grains.
-  if (std::ranges::any_of(scene.samples, &io::SampleSpec::from_file)) {
+  // Samples that are made have none between grains, but for lattices and depositions that are larger than a
+  // cell: only what is put at random knows of its faces.
+  const auto may_overlap = [&](const io::SampleSpec& spec) {
+    return spec.from_file() || (scene.setup.domain.repeats && spec.kind != io::SampleSpec::Kind::random);
+  };
+  if (std::ranges::any_of(scene.samples, may_overlap)) {
     for (const GrainPair& pair : near_pairs(scene.setup.domain, sample.x, sample.radius)) {
       const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
       overlaps.add(overlap_of(scene, sample, a, b),

@@ -39,8 +39,8 @@ void refuse_overlaps(const io::Scene& scene, const Sample& sample, const std::ve
     }
   }
   if (count == 0) return;
-  throw io::SceneError(
-      scene.source_file, 0, "sample",
+  throw io::error_in(
+      scene, "sample",
       fmt::format(
           "samples {} and {} overlap: {} pairs of grains of different samples, the deepest by {:.3g} m. "
           "Move one of them (origin, position, region), or make it smaller",
@@ -53,9 +53,9 @@ void refuse_same_ids(const io::Scene& scene, const Sample& sample) {
   std::ranges::sort(ids);
   const auto twice = std::ranges::adjacent_find(ids);
   if (twice == ids.end()) return;
-  throw io::SceneError(scene.source_file, 0, "sample",
-                       fmt::format("two samples have a body {}: give those of one file other ids",
-                                   static_cast<std::int64_t>(*twice)));
+  throw io::error_in(scene, "sample",
+                     fmt::format("two samples have a body {}: give those of one file other ids",
+                                 static_cast<std::int64_t>(*twice)));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <span>
@@ -23,12 +24,13 @@ constexpr double lightest = 30, heaviest = 23000;
 void add_density(const std::string& where, double density, std::vector<std::string>& warnings) {
   if (density < lightest)
     warnings.push_back(
-        fmt::format("{} has a density of {:g} kg/m^3, less than foam{}", where, density,
+        fmt::format("{}: a density of {:g} kg/m^3 is less than that of foam{}", where, density,
                     1000 * density < lightest || 1000 * density > heaviest
                         ? ""
                         : fmt::format("; {:g} g/cm^3 are {:g} kg/m^3", density, 1000 * density)));
   if (density > heaviest)
-    warnings.push_back(fmt::format("{} has a density of {:g} kg/m^3, more than any element", where, density));
+    warnings.push_back(
+        fmt::format("{}: a density of {:g} kg/m^3 is more than that of any element", where, density));
 }
 
 /// Coefficients of friction: silicone rubber on glass comes to 2 or 3.
@@ -42,6 +44,38 @@ void add_friction(const io::Scene& scene, std::vector<std::string>& warnings) {
   if (mu > roughest)
     warnings.push_back(fmt::format("a coefficient of friction is {:g}, more than surfaces have{}", mu,
                                    mu <= 100 ? fmt::format("; {:g} % are {:g}", mu, mu / 100) : ""));
+}
+
+/// The largest boulders of a rock fall [m].
+constexpr double largest_stone = 5;
+
+/// Positions whose last bit is more than this part of a radius leave gaps to chance.
+constexpr double coarse = 1e-6;
+
+void add_lengths(const Sample& sample, std::vector<std::string>& warnings) {
+  if (sample.size() == 0) return;
+  const double smallest = *std::ranges::min_element(sample.radius);
+  if (smallest > largest_stone)
+    warnings.push_back(fmt::format("sample: the smallest grain has a radius of {:g} m; {:g} mm are {:g} m",
+                                   smallest, smallest, smallest / 1000));
+  double farthest = 0;
+  for (const Vec3& x : sample.x) farthest = std::max(farthest, x.cwiseAbs().maxCoeff());
+  const double bit = farthest * std::numeric_limits<double>::epsilon();
+  if (bit > coarse * smallest)
+    warnings.push_back(fmt::format(
+        "sample: grains lie {:.3g} m from the origin, where positions are known to {:.2g} m, {:.2g} of the "
+        "smallest radius: move the sample nearer",
+        farthest, bit, bit / smallest));
+}
+
+/// More steps than any machine makes.
+constexpr double endless = 1e10;
+
+void add_endless_stages(const io::Scene& scene, std::vector<std::string>& warnings) {
+  for (const Stage& stage : scene.setup.stages)
+    if (stage.end.time && stage.time_step > 0 && *stage.end.time > endless * stage.time_step)
+      warnings.push_back(fmt::format("stage '{}': end.time = {:g} s takes {:.2g} steps", stage.name,
+                                     *stage.end.time, *stage.end.time / stage.time_step));
 }
 
 /// A belt moves along its surface only: of a motion along the normal nothing but rounding is left.
@@ -240,16 +274,21 @@ std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sa
   add_jumps(scene, warnings);
   add_ramps_from_nothing(scene, warnings);
   add_friction(scene, warnings);
+  add_lengths(sample, warnings);
+  add_endless_stages(scene, warnings);
   add_still_belts(scene, warnings);
   if (const auto parts = static_cast<std::size_t>(scene.setup.decomposition.subdomains);
       parts > std::max<std::size_t>(1, sample.size()) && scene.setup.inserts.empty())
     warnings.push_back(fmt::format("{} subdomains for {} grains: most of them hold none; fewer are faster",
                                    parts, sample.size()));
-  if (scene.materials.empty()) add_density("the material", scene.density, warnings);
+  if (scene.materials.empty()) add_density("material", scene.density, warnings);
   for (const io::MaterialSpec& material : scene.materials)
     add_density(fmt::format("material '{}'", material.name), material.density, warnings);
   if (std::string overlaps = describe_overlaps(scene, sample); !overlaps.empty())
     warnings.push_back(std::move(overlaps));
+  for (std::string& warning : warnings)
+    if (const int line = io::line_of(scene.places, "", warning); line > 0)
+      warning = fmt::format("{}:{}: {}", scene.source_file, line, warning);
   return warnings;
 }
 

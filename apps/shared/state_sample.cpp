@@ -182,9 +182,7 @@ void leave_flow(const Domain& domain, Sample& sample) {
 }  // namespace
 
 StateSample read_state(const io::Scene& scene) {
-  const auto refuse = [&](const std::string& what) {
-    throw io::SceneError(scene.source_file, 0, "sample.file", what);
-  };
+  const auto refuse = [&](const std::string& what) { throw io::error_in(scene, "sample.file", what); };
   const std::string name = std::filesystem::path(scene.samples.front().file).filename().string();
   const bool checkpoint = io::is_checkpoint_name(name);
   if (checkpoint && scene.samples.front().frame) refuse("a checkpoint has no frames: leave `frame` out");

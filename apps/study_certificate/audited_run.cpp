@@ -127,7 +127,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
 
 bool AuditedRun::gave_up() const {
   if (ended.empty() || !of_run || steps.empty()) return false;
-  return squeezed || !steps.back().certified || steps.back().overlapping;
+  return no_space || !steps.back().certified || steps.back().overlapping;
 }
 
 AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
@@ -183,9 +183,9 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       run.of_run = true;
       simulation.begin_next_stage();
     }
-  } catch (const SqueezedCellError& error) {
+  } catch (const NoSpaceError& error) {
     run.ended = error.what();
-    run.squeezed = true;
+    run.no_space = true;
   } catch (const std::exception& error) {
     run.ended = error.what();
   }

@@ -45,10 +45,10 @@ struct AuditedRun {
   std::vector<AuditedStep> steps;
   std::string ended;      ///< "" when all steps were done; else the error that ended the run
   bool of_run = false;    ///< it is the run's own, not one of the audit
-  bool squeezed = false;  ///< it is a SqueezedCellError
+  bool no_space = false;  ///< it is a NoSpaceError
 
-  /// It ended by itself behind a step that says that it does not hold, as where pushed walls pass one
-  /// another, or as a stress has squeezed its cell too far: the run has fooled nobody.
+  /// It ended by itself behind a step that says that it does not hold, or in one in which walls pass one
+  /// another or a stress has squeezed its cell too far: the run has fooled nobody.
   bool gave_up() const;
 };
 

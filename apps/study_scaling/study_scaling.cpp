@@ -140,6 +140,9 @@ void prepare(const StudyScalingOptions& options, PreparedStudy& study) {
     throw std::invalid_argument(fmt::format("--weak: the sample cannot grow, since {}", study.no_weak));
   study.sample = scaling_sample(options.scene, options.overrides, options.from, options.stage);
   const ScalingSample& sample = study.sample;
+  if (sample.grains.size() == 0)
+    throw std::invalid_argument(
+        "no grain is there at the beginning, all are inserted: begin from a frame of a run with --from");
   if (const auto most = static_cast<std::size_t>(study.plan.strong.back()); most > sample.grains.size())
     throw std::invalid_argument(fmt::format(
         "{} subdomains for {} grains: take fewer with --subdomains, and on machines of more cores "

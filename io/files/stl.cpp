@@ -137,9 +137,10 @@ std::vector<Triangle> read_stl(const std::string& path) {
   if (bytes.size() < head)
     throw FileError(
         path, fmt::format("is no STL file: it has {} bytes and does not begin with 'solid'", bytes.size()));
-  throw FileError(path,
-                  fmt::format("triangle {}: says it has {} triangles, {} bytes in all, but has {} bytes",
-                              (bytes.size() - head) / record + 1, count_of(bytes), wanted, bytes.size()));
+  throw FileError(
+      path, fmt::format("does not begin with 'solid', and as a binary STL file it would have {} triangles, "
+                        "{} bytes in all, but has {} bytes: those of {} triangles",
+                        count_of(bytes), wanted, bytes.size(), (bytes.size() - head) / record));
 }
 
 std::string stl_text(const std::vector<Triangle>& triangles) {

@@ -130,6 +130,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"worst_velocity_error", s.worst_velocity_error},
       {"worst_penetration", s.worst_penetration},
       {"overlapping_steps", s.overlapping_steps},
+      {"impossible_steps", s.impossible_steps},
       {"worst_overlap", s.worst_overlap},
       {"sufficient_time_step", sufficient},
       {"iterations", s.iterations},

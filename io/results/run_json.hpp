@@ -71,6 +71,7 @@ struct Summary {
   double worst_velocity_error = 0;             ///< over the certified steps
   double worst_penetration = 0;                ///< over all steps, in smallest radii
   std::int64_t overlapping_steps = 0;          ///< that ended with an overlap beyond its tolerance
+  std::int64_t impossible_steps = 0;           ///< that missed as walls close on grains which cannot get away
   double worst_overlap = 0;                    ///< over all steps, in smaller radii of a pair
   std::optional<double> sufficient_time_step;  ///< [s] that would have kept them within it
   std::int64_t iterations = 0;                 ///< over all steps

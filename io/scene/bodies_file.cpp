@@ -95,7 +95,9 @@ Sample read_bodies(const std::string& path, double density, bool rotates,
       sample.velocity.push_back(
           {value[5], value[6], value[7], radius * value[8], radius * value[9], radius * value[10]});
   }
-  if (sample.size() == 0) throw SceneError(path, place.line, "", "no bodies in the file");
+  if (sample.size() == 0)
+    throw SceneError(path, place.line, "",
+                     "no bodies in the file; below a header, id,x,y,z,radius, each has a line");
   return sample;
 }
 

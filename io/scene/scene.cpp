@@ -12,6 +12,7 @@
 #include "io/scene/detail/grain_read.hpp"
 #include "io/scene/detail/material_read.hpp"
 #include "io/scene/detail/motion_read.hpp"
+#include "io/scene/detail/places_read.hpp"
 #include "io/scene/detail/probe_read.hpp"
 #include "io/scene/detail/sample_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
@@ -37,8 +38,10 @@ bool stands_still(const std::vector<Wall>& walls, const std::vector<WallLoad>& l
 /// their lines.
 class SceneReader {
  public:
-  SceneReader(const toml::table& root, const std::string& file) : root_(root), folder_(folder_of(file)) {
+  SceneReader(const toml::table& root, const std::string& file)
+      : root_(root), folder_(std::filesystem::absolute(file).parent_path()) {
     scene_.source_file = file;
+    scene_.places = places_of(root, file);
     scene_.name = std::filesystem::path(file).stem().string();
     for (char& c : scene_.name)
       if (!may_be_in_name(c)) c = '_';
@@ -71,10 +74,6 @@ class SceneReader {
   }
 
  private:
-  static std::filesystem::path folder_of(const std::string& file) {
-    return std::filesystem::absolute(file).parent_path();
-  }
-
   /// A table that may be left out: then an empty one, so that missing keys are found all the same.
   const toml::table& table_at(const toml::table& parent, const std::string& name) {
     const toml::node* node = parent.get(name);
@@ -108,8 +107,7 @@ class SceneReader {
     for (const toml::table* table : tables_at(root_, "wall", "wall")) {
       const std::string path = fmt::format("wall[{}]", count_++);
       const auto name = (*table)["name"].value<std::string>();
-      auto found =
-          std::find_if(walls.begin(), walls.end(), [&](const Wall& w) { return name && w.name == *name; });
+      auto found = name ? std::ranges::find(walls, *name, &Wall::name) : walls.end();
       if (found != walls.end() && place[static_cast<std::size_t>(found - walls.begin())])
         fail_at(*table->get("name"), path + ".name",
                 fmt::format("another wall is named '{}' already", *name));
@@ -150,7 +148,7 @@ class SceneReader {
       return;
     }
     if (wall.normal.norm() == 0)
-      fail_at(table, path + ".side",
+      fail_at(table, path + (table.get("normal") ? ".normal" : ".side"),
               fmt::format("wall '{}' needs a side or a normal that is not zero", wall.name));
     if (const int axis = axis_of(wall); axis >= 0) {
       const double position = wall.point[axis];

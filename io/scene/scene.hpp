@@ -13,6 +13,7 @@
 #include "io/output/sinks.hpp"
 #include "io/results/results.hpp"
 #include "io/scene/scene_error.hpp"
+#include "io/scene/scene_places.hpp"
 #include "kernels/law/law_numbers.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/size_distribution.hpp"
@@ -117,10 +118,14 @@ struct Scene {
   OutputSpec output;
   CheckpointSpec checkpoint;
   std::string source_file;
+  ScenePlaces places;  ///< in source_file
 
   /// Begins where an earlier run was: the first sample says so, if any.
   bool from_state() const { return !samples.empty() && samples.front().kind == SampleSpec::Kind::state; }
 };
+
+/// What is wrong with the scene, at the line of `key`, or of what the message names; `key` may be empty.
+SceneError error_in(const Scene& scene, const std::string& key, const std::string& message);
 
 /// Reads a scene. `overrides` are texts "a.b=c" applied in order: the value is read as TOML, or taken as a
 /// text if it is none; an element of an array is named by its number or its name (stage.0.time_step,

@@ -78,7 +78,7 @@ void demand_room_in_cell(const Scene& scene, const Sample& grains) {
   try {
     check_cell(scene.setup.domain, largest, candidate_margin(scene.setup.detection, smallest));
   } catch (const std::invalid_argument& error) {
-    throw SceneError(scene.source_file, 0, "cell.lengths", error.what());
+    throw error_in(scene, "cell.lengths", error.what());
   }
 }
 
@@ -93,10 +93,9 @@ double automatic_wall_mass(const Sample& grains) {
 void place_walls_again(Scene& scene, const PlacedThen& then) {
   const auto& [points, mass, named] = then;
   std::vector<Wall>& walls = scene.setup.walls;
-  if (points.size() != 3 * walls.size())
-    throw SceneError(scene.source_file, 0, "wall", "the checkpoint is of other walls");
+  if (points.size() != 3 * walls.size()) throw error_in(scene, "wall", "the checkpoint is of other walls");
   if (named.size() != scene.setup.named.size())
-    throw SceneError(scene.source_file, 0, "sample", "the checkpoint is of other bodies");
+    throw error_in(scene, "sample", "the checkpoint is of other bodies");
   for (std::size_t k = 0; k < named.size(); ++k) scene.setup.named[k].id = BodyId{named[k]};
   for (std::size_t w = 0; w < walls.size(); ++w)
     walls[w].point = {points[3 * w], points[3 * w + 1], points[3 * w + 2]};
@@ -104,16 +103,14 @@ void place_walls_again(Scene& scene, const PlacedThen& then) {
   try {
     validate(scene.setup);
   } catch (const std::invalid_argument& error) {
-    throw SceneError(scene.source_file, 0, "", error.what());
+    throw error_in(scene, "", error.what());
   }
 }
 
 void place_walls(Scene& scene, const Sample& grains) {
-  const auto refuse = [&](const std::string& message) {
-    throw SceneError(scene.source_file, 0, "wall", message);
-  };
+  const auto refuse = [&](const std::string& message) { throw error_in(scene, "wall", message); };
   if (grains.size() == 0 && scene.setup.inserts.empty())
-    throw SceneError(scene.source_file, 0, "sample", "there are no grains");
+    throw error_in(scene, "sample", "there are no grains");
   for (std::size_t k = 0; k < grains.named.size(); ++k) scene.setup.named.at(k).id = grains.named[k];
   std::vector<Wall>& walls = scene.setup.walls;
   for (Wall& wall : walls)
@@ -130,7 +127,7 @@ void place_walls(Scene& scene, const Sample& grains) {
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);
   for (const ProbeRule& probe : scene.setup.probes)
     if (const std::string fault = detail::probe_fault(probe, walls); !fault.empty())
-      throw SceneError(scene.source_file, 0, "probe", fault);
+      throw error_in(scene, "probe", fault);
   for (const Wall& wall : walls)
     for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < grains.size(); ++k)
       if (const double depth = depth_behind(wall, grains.x[k]); depth > 0)
@@ -139,7 +136,7 @@ void place_walls(Scene& scene, const Sample& grains) {
   try {
     validate(scene.setup);
   } catch (const std::invalid_argument& error) {
-    throw SceneError(scene.source_file, 0, "", error.what());
+    throw error_in(scene, "", error.what());
   }
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -35,7 +36,8 @@ Incoming coming_in(const BodyProblem& problem) {
   return in;
 }
 
-/// Impulses f = max(0, -(v_n + b))/W_nn by which contacts still approach behind a step, and what they prove.
+/// Impulses f = P_Kmu(-(v + b))/W_nn by which contacts still approach behind a step, without friction max(0,
+/// -(v_n + b)) along the normals, and what they prove.
 struct Approach {
   double sum = 0;    ///< of f [N s]
   double speed = 0;  ///< -f.b / |H f|_M^-1 [J^(1/2)]
@@ -46,12 +48,12 @@ Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
   double work = 0;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
-    const double approach = -c.normal.dot(step.velocity(k, step.motion));
-    if (!(approach > 0)) continue;
-    const double f = effective_mass(problem, c) * approach;
-    left.sum += f;
-    add_force(c, Vec3(f * c.normal), momentum);
-    work -= c.offset.dot(f * c.normal);
+    const Vec3 approach = project_on_cone(Vec3(-step.velocity(k, step.motion)), c.normal, c.mu);
+    if (!(c.normal.dot(approach) > 0)) continue;
+    const Vec3 f = effective_mass(problem, c) * approach;
+    left.sum += c.normal.dot(f);
+    add_force(c, f, momentum);
+    work -= c.offset.dot(f);
   }
   double norm2 = 0;
   for (std::size_t b = 0; b < momentum.size(); ++b) {
@@ -64,25 +66,25 @@ Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
   return left;
 }
 
-/// No contact approaches where nothing moves.
+/// No contact approaches, by more than it slides apart, where nothing moves.
 bool rest_is_admissible(const BodyProblem& problem) {
-  return std::ranges::all_of(problem.contacts,
-                             [](const ContactEquation& c) { return c.normal.dot(c.offset) >= 0; });
+  return std::ranges::all_of(problem.contacts, [](const ContactEquation& c) {
+    return c.normal.dot(c.offset) >= c.mu * tangential(c, c.offset).norm();
+  });
 }
 
-}  // namespace
-
-bool none_admissible(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
-                     double& work) {
+/// `problem`: with the cones of which the admissible velocities are the dual, and no impulses.
+bool out_of_reach(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
+                  double& work) {
   if (rest_is_admissible(problem)) return false;
-  const BodyProblem smooth = frictionless(problem);
-  const Incoming in = coming_in(smooth);
+  const Incoming in = coming_in(problem);
   const double scale = std::sqrt(in.speed2), off = thresholds.inner * std::sqrt(in.mass) * scale;
-  ProximalStep step(smooth, thresholds.first_firmness);
+  ProximalStep step(problem, thresholds.first_firmness);
+  std::ranges::fill(step.shift, 0.0);
   double best = 0;
   for (int k = 0, since = 0; k < thresholds.most_steps && since < thresholds.patience && work > 0; ++k) {
     minimise({off, off}, thresholds.newton, step, work);
-    const Approach left = approach_of(smooth, step);
+    const Approach left = approach_of(problem, step);
     if (!(left.sum > enough)) return false;
     if (left.speed > thresholds.beyond * scale) return true;
     const bool firm = step.firmness >= thresholds.last_firmness;  // soft springs tell little
@@ -91,10 +93,24 @@ bool none_admissible(const BodyProblem& problem, double enough, const Admissible
     else if (firm)
       ++since;
     best = std::max(best, left.speed);
-    for (std::size_t c = 0; c < smooth.contacts.size(); ++c) step.centre[c] = step.carried(c, step.motion);
+    for (std::size_t c = 0; c < problem.contacts.size(); ++c) step.centre[c] = step.carried(c, step.motion);
     step.firmness = std::min(thresholds.growth * step.firmness, thresholds.last_firmness);
   }
   return false;
+}
+
+}  // namespace
+
+bool none_admissible(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
+                     double& work) {
+  return out_of_reach(frictionless(problem), enough, thresholds, work);
+}
+
+bool friction_may_lock(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
+                       double& work) {
+  BodyProblem free = problem;
+  free.impulse.assign(problem.contacts.size(), Vec3::Zero());
+  return out_of_reach(free, enough, thresholds, work);
 }
 
 }  // namespace talus

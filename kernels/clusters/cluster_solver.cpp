@@ -207,6 +207,9 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   // kinds press contacts against one another without end, these solvers would, too.
   if (!answer.solved && !problem.has_cell() && !stuck)
     solve_by_matrix(problem, goal.enough, left, thresholds, answer);
+  if (answer.solved || problem.has_cell() || !has_friction(problem)) return;
+  left = thresholds.admissible_share * budget;
+  answer.locked = friction_may_lock(problem, goal.enough, thresholds.admissible, left);
 }
 
 /// Where an answer takes moments as given: what the rounds, which do not, would change in velocities or in an

@@ -64,6 +64,7 @@ struct ClusterAnswer {
   bool knows_moments = false;  ///< Correction::knows_moments
   bool helps = false;          ///< with the change they are nearer to it than before
   bool jammed = false;         ///< there is none: none_admissible
+  bool locked = false;         ///< none was found, and it may be friction that locks: friction_may_lock
 };
 
 /// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, but find no more

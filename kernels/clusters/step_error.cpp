@@ -55,6 +55,7 @@ class Answers {
     error.mends = any(&ClusterAnswer::helps, true);
     error.solved = !any(&ClusterAnswer::solved, false);
     error.jammed = any(&ClusterAnswer::jammed, true);
+    error.locked = any(&ClusterAnswer::locked, true);
     error.change = changes(&ClusterAnswer::impulse);
     error.moments = changes(&ClusterAnswer::moment);
     error.exchanged = exchanged_;

@@ -60,6 +60,7 @@ struct StepError {
   bool mends = false;    ///< of clusters that are wrong by more than what is asked for it mends some
   bool solved = true;    ///< of all of those an answer was found
   bool jammed = false;   ///< of one of them there is none: walls close on grains that cannot get away
+  bool locked = false;   ///< of one none was found, and it may be friction that holds its grains there
   Exchanged exchanged;   ///< by the contacts of all clusters
 
   /// The worst of all, NaN where one is.

@@ -66,7 +66,7 @@ Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, Whole
       judged && result_.error_rms <= settings_.tolerance && result_.error_max <= settings_.worst_allowed();
   const bool last = check.iterations >= settings_.max_iterations;
   result_.unbalance = result_.drift;
-  result_.velocity_error = 0;
+  result_.velocity_error = result_.velocity_claim = 0;
   const bool stagnant = history_.stagnant(settings_.tolerance, thresholds_.patience, thresholds_.stagnation);
   const bool gives_up = last || (stagnant && !check.other_ways);
   // Only a step that may end pays for an answer about the whole problem.
@@ -83,7 +83,7 @@ Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, Whole
   if (result_.converged) return Verdict::solved;
   // A NaN fails every comparison above.
   if (std::isnan(result_.error_rms)) return Verdict::not_finite;
-  if (result_.jammed) return Verdict::impossible;
+  if (result_.jammed || result_.locked) return Verdict::impossible;
   // What sweeps do not get at, a direct solve may have found: small clusters are put right before a step is
   // given up.
   if (gives_up && check.corrects && mends_ && correctable()) return Verdict::go_on;
@@ -155,7 +155,7 @@ bool Certificate::even(WholeProblem& whole) {
 
 bool Certificate::balanced(WholeProblem& whole) {
   const double tolerance = settings_.balance_tolerance;
-  result_.unbalance = result_.velocity_error = 0;
+  result_.unbalance = result_.velocity_error = result_.velocity_claim = 0;
   if (result_.contacts == 0) return true;
   const bool last = result_.iterations >= settings_.max_iterations;
   const int since = result_.iterations - started_at();
@@ -187,6 +187,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
     mends_ = error.mends;
     // Sweeps go on where others can still be put right.
     result_.jammed = error.jammed && !error.mends;
+    result_.locked = error.locked && !error.mends;
     result_.unanswered = !error.solved;
     if (!error.solved) {
       ++doubts_;
@@ -217,26 +218,28 @@ double Certificate::large_unbalance(WholeProblem& whole) {
   if (checks_velocities(whole)) {
     const double error = repeated(large_check_, std::min(settings_.balance_tolerance, velocity_tolerance()),
                                   [&](double enough) { return whole.large_error(enough); });
-    result_.velocity_error = claimed(
-        larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work(whole)), whole);
+    claim(larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work(whole)), whole);
     return error;
   }
   const double to_come = drifting(whole);
-  if (to_come <= settings_.balance_tolerance) result_.velocity_error = claimed(by_work(whole), whole);
+  if (to_come <= settings_.balance_tolerance) claim(by_work(whole), whole);
   return to_come;
 }
 
 /// Contacts that slide do work that nobody's velocity lacks, so that a step is not missed for all of it. But
-/// whoever believes the step is told of it, up to the tolerance that it meets: checks of velocities know
-/// little of sliding, and in a bed on a belt they found 0.2 of the work where 1.8 of it were missing. All of
-/// it may be missing at one wall, whose force is compared with less than what contacts exchange where grains
-/// come to rest: in a column that settles in a tube the floor got 2.3 times its force. A tolerance that the
-/// user has set speaks of velocities, and bounds what is told of these.
-double Certificate::claimed(double error, WholeProblem& whole) {
-  if (!scales_.friction) return error;
+/// whoever believes the step is told of it, beyond the tolerance, too: checks of velocities know little of
+/// sliding, and in a bed on a belt they found 0.2 of the work where 1.8 of it were missing. All of it may be
+/// missing at one wall, whose force is compared with less than what contacts exchange where grains come to
+/// rest: in a column that settles in a tube the floor got 2.3 times its force. A tolerance that the user has
+/// set speaks of velocities, and bounds what is told of these.
+void Certificate::claim(double error, WholeProblem& whole) {
+  result_.velocity_error = result_.velocity_claim = error;
+  if (!scales_.friction) return;
   const double told = whole.velocity_errors().reuse().told_sliding * relative_work(whole);
-  if (settings_.velocity_tolerance > 0) return larger(error, told);
-  return larger(error, std::min(told * exchanged_over_walls(), velocity_tolerance()));
+  if (settings_.velocity_tolerance > 0)
+    result_.velocity_error = result_.velocity_claim = larger(error, told);
+  else
+    result_.velocity_claim = larger(error, std::min(told * exchanged_over_walls(), thresholds_.all_wrong));
 }
 
 /// Momentum that contacts of large clusters exchange, about (for grains at most, by Cauchy and Schwarz), over

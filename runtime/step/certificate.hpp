@@ -28,10 +28,11 @@ struct IterationResult {
   double drift =
       0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
   double unbalance = 0;  ///< estimate of the relative error of the forces: Certificate::balanced
-  /// Estimate of the relative error of velocities in large clusters; 0 where the step ended before it was
-  /// asked for.
+  /// Estimate of the relative error of velocities in large clusters, on which the verdict depends; 0 where
+  /// the step ended before it was asked for.
   double velocity_error = 0;
-  BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
+  double velocity_claim = 0;  ///< what is told of it: with friction it may be more (Certificate::claim)
+  BodyAdmmResult stiff;       ///< of the last call of ADMM in this step
   int stiff_calls = 0;
   int corrections = 0;  ///< times that small clusters were put right
   std::int64_t contacts = 0, active = 0;
@@ -39,6 +40,7 @@ struct IterationResult {
   bool diverged = false;    ///< the error grows without bound
   bool stagnated = false;   ///< more sweeps would not have made the error smaller
   bool jammed = false;      ///< there is no solution: walls close on grains that cannot get away
+  bool locked = false;      ///< that may be: grains get away, but for friction
   bool unanswered = false;  ///< how wrong a small cluster is nobody knows: its direct solve found no answer
   WorstErrors worst;        ///< where it did not converge
 };
@@ -77,6 +79,8 @@ struct CertificateThresholds {
   /// many sweeps of this step have not mended that, > 0; again when they have grown by the factor, > 1.
   int doubtful = 400;
   double doubt_again = 2;
+  /// An estimate of the error of velocities that says no more than that nothing is known of them, > 0.
+  double all_wrong = 1;
   /// Part of the impulse at the most pressed wall, in (0, 1), that grains exchange at least.
   double interest = BalanceThresholds{}.interest;
   /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
@@ -107,6 +111,7 @@ struct SmallError {
   bool solved = true;   ///< answers were found for all that are wrong by more than what was asked for
   bool mends = false;   ///< of these some can be put right
   bool jammed = false;  ///< one has none: no velocities keep its contacts from approaching
+  bool locked = false;  ///< of one none was found, and friction may hold its grains between closing walls
   Exchanged exchanged;  ///< by the contacts of small clusters that nothing else is asked of
 };
 
@@ -267,7 +272,7 @@ class Certificate {
   bool even(WholeProblem& whole);
   double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
-  double claimed(double error, WholeProblem& whole);
+  void claim(double error, WholeProblem& whole);
   double exchanged_over_walls() const;
   bool large_ask_for_more(WholeProblem& whole);
   double drifting(WholeProblem& whole);

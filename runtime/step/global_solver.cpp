@@ -253,7 +253,8 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   // not.
   const bool apart = !twice_ && !knows_more(parameters_);
   small_seconds_ += graph::seconds_now() - began;
-  return {error.relative(), error.solved, error.mends, error.jammed, apart ? error.exchanged : Exchanged{}};
+  return {error.relative(), error.solved, error.mends,
+          error.jammed,     error.locked, apart ? error.exchanged : Exchanged{}};
 }
 
 double GlobalSolver::take_small_seconds() {

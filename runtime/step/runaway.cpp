@@ -30,7 +30,7 @@ void check_walls_apart(const std::vector<Wall>& walls, double facing, const Step
           (moving.load.drive != WallDrive::fixed || !moving.motion.empty()) &&
           (moving.normal + other.normal).norm() < facing &&
           (other.point - moving.point).dot(moving.normal) < 0)
-        throw RunawayError(
+        throw NoSpaceError(
             fmt::format("{}: wall '{}' has passed wall '{}', which faces it. Are there grains "
                         "between them? Reduce the load, the velocity or the time step",
                         step.text(), moving.name, other.name));
@@ -42,7 +42,7 @@ double pressed_area(const StepState& state, std::size_t w, const StepName& step)
   try {
     return face_area(state.walls, w, state.domain.edges());
   } catch (const std::invalid_argument&) {
-    throw RunawayError(fmt::format(
+    throw NoSpaceError(fmt::format(
         "{}: the walls beside wall '{}' have passed each other, so its "
         "pressure acts on nothing. Are there grains between them? Reduce the time step or the pressure",
         step.text(), state.walls[w].name));

@@ -14,9 +14,10 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A flow or a stress has squeezed a periodic cell until a body could touch two images of another
-/// (check_cell): the end of what the scene can show, and no error of its steps.
-class SqueezedCellError : public RunawayError {
+/// Nothing is left for grains to be in: walls have passed one another, or a flow or a stress has squeezed a
+/// periodic cell until a body could touch two images of another (check_cell). The end of what the scene can
+/// show, in a step of which nothing is told, and no error of those before.
+class NoSpaceError : public RunawayError {
  public:
   using RunawayError::RunawayError;
 };

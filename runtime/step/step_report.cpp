@@ -110,7 +110,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   report.error_quantile = result.error_quantile;
   report.worst = result.worst;
   report.balance = larger(result.unbalance, defect);
-  report.velocity_error = result.velocity_error;
+  report.velocity_error = result.velocity_claim;
   report.jump = result.jump;
   report.migrants = sums.migrants;
   report.imbalance = 1 + state.decomposition.imbalance;

@@ -43,7 +43,10 @@ def read_table(path: str | os.PathLike[str]) -> np.ndarray:
     for number, row in enumerate(rows, start=2):
         if len(row) != len(names):
             raise DamagedFile(f"{path}: row {number} has {len(row)} cells, the header {len(names)}")
-    columns = [_column(name, [row[k] for row in rows]) for k, name in enumerate(names)]
+    try:
+        columns = [_column(name, [row[k] for row in rows]) for k, name in enumerate(names)]
+    except DamagedFile as error:
+        raise DamagedFile(f"{path}: is damaged: {error}") from None
     table = np.empty(len(rows), dtype=[(name, column.dtype) for name, column in zip(names, columns)])
     for name, column in zip(names, columns):
         table[name] = column
@@ -57,5 +60,17 @@ def _column(name: str, cells: list[str]) -> np.ndarray:
         if name in FLAGS:
             return np.array([cell == "1" for cell in cells], dtype=bool)
         return np.array(cells, dtype=np.str_).astype(np.int64 if name in INTEGERS else np.float64)
-    except ValueError:  # a column of text that this package does not know by name
-        return np.array(cells, dtype=np.str_)
+    except ValueError:
+        wrong = [k for k, cell in enumerate(cells) if not _is_number(cell)]
+        if name in INTEGERS or len(wrong) < len(cells):
+            row = wrong[0] if wrong else 0
+            raise DamagedFile(f"row {row + 2}: `{cells[row]}` in the column `{name}` is no number of its kind") from None
+        return np.array(cells, dtype=np.str_)  # a column of text that this package does not know by name
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True

@@ -40,6 +40,7 @@ std::string listed(const std::vector<std::string>& words) {
 }
 
 std::string hint(const std::string& word, const std::vector<std::string>& known) {
+  if (known.empty()) return "; there are none";
   const std::string meant = nearest(word, known);
   return meant.empty() ? "; known are: " + listed(known) : fmt::format("; did you mean '{}'?", meant);
 }

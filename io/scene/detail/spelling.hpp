@@ -14,7 +14,8 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
 /// "a, b, c".
 std::string listed(const std::vector<std::string>& words);
 
-/// "; did you mean 'x'?" when a word is near, else "; known are: a, b, c".
+/// "; did you mean 'x'?" when a word is near, else "; known are: a, b, c", or "; there
+/// are none".
 std::string hint(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace talus::io::detail

@@ -184,8 +184,10 @@ toml::table parse_document(const std::string& text, const std::string& file,
     }
     return root;
   } catch (const toml::parse_error& error) {
+    const std::string what(error.description());
+    const bool bare = what.find("could not determine value type") != std::string::npos;
     throw SceneError(file, static_cast<int>(error.source().begin.line), "",
-                     "not TOML: " + std::string(error.description()));
+                     "not TOML: " + what + (bare ? "; texts stand in quotes, numbers have no units" : ""));
   }
 }
 

@@ -174,7 +174,7 @@ struct Simulation::Implementation {
     try {
       check_cell(state.domain, largest_radius, parameters.alert + parameters.skin);
     } catch (const std::invalid_argument& error) {
-      throw SqueezedCellError(fmt::format("{}: {}", next_step().text(), error.what()));
+      throw NoSpaceError(fmt::format("{}: {}", next_step().text(), error.what()));
     }
   }
 

@@ -71,6 +71,15 @@ TEST(CertificateAudit, OfAGrainThatGrazesAnotherByRoundingFollowsTheRun) {
   EXPECT_GE(within_their_claims(audited(column, 16)), 10);
 }
 
+TEST(CertificateAudit, OfAWallThatFliesThroughAnotherEndsARunThatHasFooledNobody) {
+  // 10 g pushed by 74 kN have left the grains, and go a third of a metre in step 14, through all of the box.
+  const AuditedRun run = audited(make_scene("press", 910577, {}), 20);
+  ASSERT_EQ(run.steps.size(), 13U);
+  EXPECT_TRUE(run.steps.back().certified);
+  EXPECT_TRUE(run.no_space) << run.ended;
+  EXPECT_TRUE(run.gave_up());
+}
+
 TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDeceived) {
   // In step 2 rows of five grains, which lean by 10^-4, still close by 10^-7 m/s where others part by 10^-2.
   MadeScene made = make_scene("lattice", 1036, {});

@@ -259,7 +259,7 @@ TEST(CertificateStudy, ARunThatEndsByAnErrorHasGivenUpOnlyBehindAStepThatDoesNot
   run.steps.back() = {};
   EXPECT_TRUE(run.gave_up());
   run.steps.back().certified = true;
-  run.squeezed = true;
+  run.no_space = true;
   EXPECT_TRUE(run.gave_up());
   run.ended.clear();
   EXPECT_FALSE(run.gave_up());

@@ -62,9 +62,10 @@ TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
 
 TEST_F(Warnings, OfADensityInOtherUnits) {
   EXPECT_NE(of(replaced(column_scene, "2600", "2.6"))
-                .find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
+                .find("2.6 kg/m^3 is less than that of foam; 2.6 g/cm^3 are 2600 kg/m^3"),
             std::string::npos);
-  EXPECT_NE(of(replaced(column_scene, "2600", "2.6e6")).find("more than any element"), std::string::npos);
+  EXPECT_NE(of(replaced(column_scene, "2600", "2.6e6")).find("more than that of any element"),
+            std::string::npos);
   EXPECT_EQ(of(replaced(column_scene, "2600", "1e-3")).find("g/cm^3"), std::string::npos)
       << "0.001 is no unit";
 }
@@ -164,6 +165,33 @@ TEST_F(Warnings, OfWallsThatCloseOnGrainsThatCannotGetAway) {
   EXPECT_NE(outcome.messages.find("in 4 steps walls close on grains that cannot get away"), std::string::npos)
       << outcome.messages;
   EXPECT_LT(summary(at("results")).at("iterations").get<int>(), 400) << "they end early";
+}
+
+/// A plate that comes down on a wedge of 20 degrees, whose half angle is less than that of friction: the
+/// grain is nipped. No sweeps and no shorter step mend that, and none are advised.
+TEST_F(Warnings, OfWallsThatNipAGrainWhichFrictionHolds) {
+  std::string scene = with_bodies(column_scene);
+  scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
+  write(at("scene.toml"), scene + R"(
+[[wall]]
+name = "blade"
+normal = [0, 0.34202, -0.93969]
+point = [0, 0, 0.0212]
+drive = "velocity"
+velocity = [0, 0, -0.05]
+)");
+  write(at("grains.csv"), "id,x,y,z,radius\n42,0,0,0.01,0.01\n");
+  const Outcome outcome =
+      run("run scene.toml --out results --set stage.0.end.steps=60 --set material.wall_friction=0.35");
+  EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("steps walls close on grains that friction does not let get away"),
+            std::string::npos)
+      << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("max_iterations"), std::string::npos) << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("would do"), std::string::npos) << outcome.messages;
+  const auto results = summary(at("results"));
+  EXPECT_GT(results.at("impossible_steps").get<int>(), 5);
+  EXPECT_LT(results.at("iterations").get<int>(), 6000) << "they end early";
 }
 
 // The lid goes into the grain. A shorter time step mends nothing where walls close on it, so none is

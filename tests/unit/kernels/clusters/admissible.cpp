@@ -140,6 +140,22 @@ TEST(Admissible, AClusterWithoutAnAnswerIsNotSolvedAndSaidToBeJammed) {
   EXPECT_TRUE(answer.jammed);
 }
 
+/// A grain that a wedge of half angle a squeezes out parts from walls that it slides along if tan a > mu, and
+/// turning does not help: the angle of nip of a roll crusher.
+TEST(Admissible, AWedgeHoldsWhatItNipsBelowTheAngleOfFriction) {
+  for (const double mu : {0.1, 0.3, 0.7})
+    for (const double over : {0.9, 0.99, 1.01, 1.1}) {
+      BodyProblem problem = wedge(std::atan(over * mu), mu);
+      close(problem, 0.01);
+      EXPECT_FALSE(none(problem)) << "without friction it gets away";
+      double work = 1e9;
+      EXPECT_EQ(friction_may_lock(problem, enough, {}, work), over < 1) << mu << ' ' << over;
+      const ClusterAnswer answer = solve_cluster(problem, {.enough = 1e-4, .relative = 1e-3, .sweeps = 100});
+      EXPECT_EQ(answer.solved, over > 1) << mu << ' ' << over;
+      EXPECT_EQ(answer.locked, over < 1) << mu << ' ' << over;
+    }
+}
+
 TEST(Admissible, KeepsToItsWork) {
   double work = 1;
   EXPECT_FALSE(none_admissible(row(100, 0, 1, 0), enough, {}, work));
