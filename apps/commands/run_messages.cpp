@@ -212,7 +212,7 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
                                                                          : ": there nothing is known of them",
         solver.velocity_tolerance > 0
             ? ""
-            : "; with friction that is often ten times what is wrong, and no step is swept longer for it: "
+            : "; with friction the estimate is often ten times too large, and no step is swept longer for it: "
               "solver.velocity_tolerance, where it is set, bounds it");
   terminal.say("results in {}", directory);
 }

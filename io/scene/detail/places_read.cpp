@@ -8,11 +8,9 @@ namespace talus::io::detail {
 
 namespace {
 
-/// A wall that has no name has that of its side; other things have their number.
+/// What has no name is named by its number.
 std::string name_of(const toml::table& table, const std::string& kind, std::size_t k) {
-  for (const char* key : {"name", "side"})
-    if (const auto name = table[key].value<std::string>()) return *name;
-  return fmt::format("{}-{}", kind, k + 1);
+  return table["name"].value<std::string>().value_or(fmt::format("{}-{}", kind, k + 1));
 }
 
 class Collector {

@@ -60,6 +60,28 @@ TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
       << "there is nothing to hang from";
 }
 
+TEST_F(Warnings, OfALatticeThatIsLargerThanItsCell) {
+  const std::string lattice = replaced(cell_scene, "\"random\"\ncount = 20\nradius = 0.005",
+                                       "\"lattice\"\ncells = [3, 3, 3]\nspacing = 1\nradius = 0.005");
+  EXPECT_EQ(of(lattice), "");
+  const std::string warnings = of(replaced(lattice, "0.1, 0.1, 0.1", "0.1, 0.1, 0.027"));
+  EXPECT_NE(warnings.find("9 overlaps of more than 10 %"), std::string::npos) << warnings;
+}
+
+TEST_F(Warnings, OfLengthsInOtherUnitsAndPlacesThatAreTooFarAway) {
+  EXPECT_NE(of(replaced(column_scene, "radius = 0.01", "radius = 10")).find("10 mm are 0.01 m"),
+            std::string::npos);
+  const std::string far = replaced(with_bodies(column_scene), "steps = 4", "time = 1e30");
+  write(at("grains.csv"), "id,x,y,z,radius\n42,1e10,0,0.01,0.01\n");
+  const std::string warnings = of(far);
+  EXPECT_NE(warnings.find("grains lie 1e+10 m from the origin"), std::string::npos) << warnings;
+  EXPECT_NE(warnings.find("end.time = 1e+30 s takes 1e+33 steps"), std::string::npos) << warnings;
+}
+
+TEST_F(Warnings, NameTheLineOfWhatTheySpeakOf) {
+  EXPECT_NE(of(replaced(column_scene, "2600", "2.6")).find("scene.toml:5: material: "), std::string::npos);
+}
+
 TEST_F(Warnings, OfADensityInOtherUnits) {
   EXPECT_NE(of(replaced(column_scene, "2600", "2.6"))
                 .find("2.6 kg/m^3 is less than that of foam; 2.6 g/cm^3 are 2600 kg/m^3"),

@@ -96,6 +96,20 @@ TEST_F(PartitionCommand, OneSubdomainHasEverythingAndNoInterface) {
     EXPECT_EQ(row(outcome.output, label), Numbers(2 * ways().size(), 0)) << label;
 }
 
+TEST_F(PartitionCommand, RefusesASceneThatBeginsWithoutGrains) {
+  const std::size_t sample = cell_scene.find("[cell]");
+  write(at("scene.toml"), cell_scene.substr(0, sample) + R"([[insert]]
+radius = 0.01
+count = 3
+region = { shape = "box", low = [0, 0, 0], high = [0.1, 0.1, 0.1] }
+[[stage]]
+end = { steps = 3 }
+)");
+  const Outcome outcome = run("partition scene.toml --subdomains 2");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.messages.find("there is nothing to cut"), std::string::npos) << outcome.messages;
+}
+
 TEST_F(PartitionCommand, SaysTheSameOnAnyNumberOfThreads) {
   write(at("scene.toml"), pressed_box);
   const std::string command = "partition scene.toml --subdomains 12 --out ";
