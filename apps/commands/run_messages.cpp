@@ -24,7 +24,7 @@ void Tally::add(const Simulation& simulation) {
     ++stagnated;
     floor = std::max(floor, report.error_rms);
   }
-  if (simulation.iterations().jammed)
+  if (simulation.iterations().jammed && !report.converged)
     ++jammed;
   else if (simulation.iterations().locked && !report.converged)
     ++locked;
@@ -140,16 +140,19 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
                  remove.material.empty() ? "" : fmt::format(" of '{}'", remove.material), remove.mass);
 }
 
-/// Overlaps are a matter of the time step alone.
+/// Overlaps are a matter of the time step alone, and where walls close on grains nothing of that helps.
 std::string remedy_of_misses(const io::Summary& summary) {
-  std::string remedy = "Raise solver.max_iterations, reduce time_step";
+  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
+  std::string remedy;
+  if (summary.impossible_steps < summary.unconverged_steps)
+    remedy = overlaps_alone && summary.impossible_steps == 0
+                 ? "Reduce time_step"
+                 : "Raise solver.max_iterations, reduce time_step";
   if (summary.impossible_steps > 0)
-    remedy = fmt::format(
-        "Of {} neither sweeps nor a shorter time_step mend what walls that close on grains do: give these "
+    remedy += fmt::format(
+        "{}more sweeps or a shorter time_step do not mend the {} in which walls close on grains: give these "
         "room",
-        summary.impossible_steps);
-  else if (summary.unconverged_steps == summary.overlapping_steps)
-    remedy = "Reduce time_step";
+        remedy.empty() ? "" : "; ", summary.impossible_steps);
   if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
   return remedy;
 }
@@ -210,10 +213,10 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         summary.worst_velocity_error,
         summary.worst_velocity_error < CertificateThresholds{}.all_wrong ? ""
                                                                          : ": there nothing is known of them",
-        solver.velocity_tolerance > 0
-            ? ""
-            : "; with friction the estimate is often ten times too large, and no step is swept longer for it: "
-              "solver.velocity_tolerance, where it is set, bounds it");
+        solver.velocity_tolerance > 0 ? ""
+                                      : "; with friction the estimate is often ten times too large, and no "
+                                        "step is swept longer for it: "
+                                        "solver.velocity_tolerance, where it is set, bounds it");
   terminal.say("results in {}", directory);
 }
 

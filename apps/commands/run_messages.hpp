@@ -23,7 +23,7 @@ struct Tally {
   std::int64_t stagnated = 0;   ///< steps
   double floor = 0;             ///< worst error at which a step stood still
   std::int64_t jammed = 0;      ///< steps without a solution
-  std::int64_t locked = 0;      ///< likewise, as far as is known: friction holds grains between walls
+  std::int64_t locked = 0;      ///< others, in which friction may hold grains between walls
   std::int64_t unanswered = 0;  ///< others that missed, in which a small cluster has no answer
   std::int64_t iterations = 0;
   double worst_error = 0;

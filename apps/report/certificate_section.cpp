@@ -64,11 +64,14 @@ std::string verdict(const RunFolder& run, std::size_t steps, std::size_t missed)
 }
 
 /// The loosest bound of any stage; 0: not known.
+/// 0 where no step is held to a tolerance: with friction more is told than what steps are swept for.
 double velocity_allowed(const RunFolder& run) {
   if (!run.scene) return 0;
   const Setup& setup = run.scene->setup;
-  return setup.solver.velocity_allowed(std::ranges::any_of(
-      setup.stages, [](const Stage& stage) { return stage.laws.largest(&PairLaw::friction) > 0; }));
+  const bool friction = std::ranges::any_of(
+      setup.stages, [](const Stage& stage) { return stage.laws.largest(&PairLaw::friction) > 0; });
+  if (friction && setup.solver.velocity_tolerance == 0) return 0;
+  return setup.solver.velocity_allowed(friction);
 }
 
 }  // namespace
@@ -108,8 +111,9 @@ HtmlSections certificate_section(const RunFolder& run) {
         {"Error of velocities", "error, velocities", "velocity_error", velocity_allowed(run),
          "In clusters of contacts that are too large for a direct solve: estimated momentum of the errors "
          "of velocities, over what these contacts exchange; with friction over the largest impulse of a "
-         "wall, if "
-         "that is less."}));
+         "wall, if that is less, often ten times too large, and no bound unless velocity_tolerance is set; "
+         "1: "
+         "nothing is known."}));
   return {section};
 }
 

@@ -24,13 +24,13 @@ constexpr double lightest = 30, heaviest = 23000;
 void add_density(const std::string& where, double density, std::vector<std::string>& warnings) {
   if (density < lightest)
     warnings.push_back(
-        fmt::format("{}: a density of {:g} kg/m^3 is less than that of foam{}", where, density,
+        fmt::format("{}density = {:g} kg/m^3 is less than that of foam{}", where, density,
                     1000 * density < lightest || 1000 * density > heaviest
                         ? ""
                         : fmt::format("; {:g} g/cm^3 are {:g} kg/m^3", density, 1000 * density)));
   if (density > heaviest)
     warnings.push_back(
-        fmt::format("{}: a density of {:g} kg/m^3 is more than that of any element", where, density));
+        fmt::format("{}density = {:g} kg/m^3 is more than that of any element", where, density));
 }
 
 /// Coefficients of friction: silicone rubber on glass comes to 2 or 3.
@@ -74,8 +74,8 @@ constexpr double endless = 1e10;
 void add_endless_stages(const io::Scene& scene, std::vector<std::string>& warnings) {
   for (const Stage& stage : scene.setup.stages)
     if (stage.end.time && stage.time_step > 0 && *stage.end.time > endless * stage.time_step)
-      warnings.push_back(fmt::format("stage '{}': end.time = {:g} s takes {:.2g} steps", stage.name,
-                                     *stage.end.time, *stage.end.time / stage.time_step));
+      warnings.push_back(fmt::format("stage '{}': end.time = {:g} s takes {:.2g} steps; times are in seconds",
+                                     stage.name, *stage.end.time, *stage.end.time / stage.time_step));
 }
 
 /// A belt moves along its surface only: of a motion along the normal nothing but rounding is left.
@@ -281,9 +281,9 @@ std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sa
       parts > std::max<std::size_t>(1, sample.size()) && scene.setup.inserts.empty())
     warnings.push_back(fmt::format("{} subdomains for {} grains: most of them hold none; fewer are faster",
                                    parts, sample.size()));
-  if (scene.materials.empty()) add_density("material", scene.density, warnings);
+  if (scene.materials.empty()) add_density("material.", scene.density, warnings);
   for (const io::MaterialSpec& material : scene.materials)
-    add_density(fmt::format("material '{}'", material.name), material.density, warnings);
+    add_density(fmt::format("material '{}': ", material.name), material.density, warnings);
   if (std::string overlaps = describe_overlaps(scene, sample); !overlaps.empty())
     warnings.push_back(std::move(overlaps));
   for (std::string& warning : warnings)

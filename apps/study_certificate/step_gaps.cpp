@@ -5,13 +5,6 @@
 
 namespace talus::audit {
 
-namespace {
-
-/// A normal that has turned by less at the end of the way is the same.
-constexpr double bends = 1e-3;
-
-}  // namespace
-
 bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double reach, double& bias) {
   if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
   bias = std::max(0.0, pair.gap) / numbers.h;
@@ -34,7 +27,7 @@ double gap_on_the_way(const Vec3& normal, double gap, const Vec3& d, const Passi
   const Vec3& way = passing.way;
   const double along = normal.dot(way);
   const Vec3 aside = way - along * normal;
-  if (!(gap > passing.held && gap + along < 0 && aside.norm() > bends * d.norm())) return gap;
+  if (!(gap > passing.held && gap + along < 0 && aside.norm() > turned_normal * d.norm())) return gap;
   // By how far the line of the way passes the other centre, where that lies on it.
   const double length = way.norm(), before = -d.dot(way) / length,
                nearest = before < length ? (d + before / length * way).norm() : (d + way).norm(),

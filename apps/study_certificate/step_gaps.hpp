@@ -7,6 +7,9 @@
 
 namespace talus::audit {
 
+/// A normal that has turned by less at the end of a way is the same.
+constexpr double turned_normal = 1e-3;
+
 /// Numbers that decide which pairs are contacts: the time step h [s], the alert distance and that from which
 /// an impact turns a pair [m], and the speed up to which it has no restitution [m/s]. E: 0 with Newton's law,
 /// else the largest restitution.
@@ -32,8 +35,8 @@ bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, 
 struct Passing {
   Vec3 way;         ///< of the first against the other, with the velocities before the step [m]
   double held;      ///< up to this gap cohesion holds, and the way counts for nothing [m]
-  double rounding;  ///< where they pass as near as this [m],
-  bool carries;     ///< the run says whether they meet
+  double rounding;  ///< where they pass as near as this it does not tell whether they meet [m]
+  bool carries;     ///< whether they do in the run
 };
 
 /// Of two spheres that would use up their gap and turn about one another, the gap that leads along `normal`

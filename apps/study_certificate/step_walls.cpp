@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "apps/study_certificate/step_gaps.hpp"
 #include "apps/study_certificate/touch_shapes.hpp"
 
 namespace talus::audit {
@@ -196,10 +197,10 @@ namespace {
 
 /// How a touch is followed along a way.
 struct Following {
-  int parts = 64;          ///< of the way; from one to the next a place moves little
-  double bends = 1e-3;     ///< a normal that has turned by less at the end is the same
-  double exact = 1e-12;    ///< part of the way to which a place on it is found
-  double straight = 1e-6;  ///< a face's normal turns by less while an edge's would turn by `bends`
+  int parts = 64;                ///< of the way; from one to the next a place moves little
+  double bends = turned_normal;  ///< a normal that has turned by less at the end is the same
+  double exact = 1e-12;          ///< part of the way to which a place on it is found
+  double straight = 1e-6;        ///< a face's normal turns by less while an edge's would turn by `bends`
 };
 
 /// A touch of a sphere on its way, s in [0, 1].

@@ -209,8 +209,8 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
   if (heaviest <= floors.lopsided * lightest || !matters) return felt;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.exact, false);
   std::vector<double> at_contact(reference.exact.size(), 0.0), at_wall(walls.size(), 0.0);
-  // All gaps wider, all narrower, and by turns, at once as far as impulses are excused: a contact that
-  // rounding opens may not carry with a fifth of it.
+  // All gaps wider, all narrower, and by turns, by as many roundings as impulses are excused for: a contact
+  // that they close may carry nothing yet with one of them.
   constexpr std::array<std::array<double, 2>, 4> signs{{{1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
   bool any = false;
   for (const auto& sign : signs) {

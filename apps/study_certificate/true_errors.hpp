@@ -51,8 +51,8 @@ struct FeltRounding {
 };
 
 /// Where a body is far heavier than another, and what rounding makes of the mass of all could hide an error
-/// of what is `claimed`: by how much the exact answer changes when gaps differ by rounding, as far as it is
-/// found, and what rounding makes of the light ones.
+/// of what is `claimed`: by how much the exact answer changes when gaps differ by all the rounding that is
+/// excused, over how many times that is, as far as it is found; and what rounding makes of the light ones.
 FeltRounding felt_rounding(const StepProblem& problem, const Reference& reference, double claimed,
                            const ReferenceLimits& limits = {});
 

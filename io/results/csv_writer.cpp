@@ -78,7 +78,7 @@ constexpr Column<StepReport> steps_columns[] = {
      [](std::string& t, const auto& r) { put(t, r.balance); }},
     {"velocity_error", "1",
      "estimated error of velocities in clusters that no direct solve takes, over what these exchange, with "
-     "friction over the largest impulse of a wall if that is less",
+     "friction over the largest impulse of a wall if that is less, and 1 where nothing is known",
      [](std::string& t, const auto& r) { put(t, r.velocity_error); }},
     {"jump", "1", "interface jump of velocities; 0 with one subdomain",
      [](std::string& t, const auto& r) { put(t, r.jump); }},

@@ -8,7 +8,8 @@ namespace {
 
 /// Whether words end where a message goes on: "cell" does not name "cells".
 bool ends_at(const std::string& message, std::size_t end) {
-  return end == message.size() || std::string(" :.,;").find(message[end]) != std::string::npos;
+  return end == message.size() || message[end - 1] == '\'' ||
+         std::string(" :.,;").find(message[end]) != std::string::npos;
 }
 
 int line_named(const ScenePlaces& places, const std::string& message) {

@@ -6,8 +6,8 @@
 namespace talus::io {
 
 /// Lines of a scene's file, from 1, by the words with which messages name what stands there: "cell.lengths",
-/// "sample[0].count", "stage 'rest'", "stage 'rest': end.time", "wall 'lid'". What --set has brought in has
-/// none.
+/// "sample[0].count", "stage 'rest'", "stage 'rest': end.time", "wall 'lid'". 0 of what --set has
+/// brought in.
 using ScenePlaces = std::map<std::string, int>;
 
 /// The line of `key`, or of the nearest table around it; else of what `message` is about: of the most words

@@ -40,7 +40,7 @@ Incoming coming_in(const BodyProblem& problem) {
 /// -(v_n + b)) along the normals, and what they prove.
 struct Approach {
   double sum = 0;    ///< of f [N s]
-  double speed = 0;  ///< -f.b / |H f|_M^-1 [J^(1/2)]
+  double speed = 0;  ///< -sum f_n b_n / |H f|_M^-1 [J^(1/2)]
 };
 Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
   std::vector<Twist> momentum(problem.bodies.size());
@@ -53,7 +53,7 @@ Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
     const Vec3 f = effective_mass(problem, c) * approach;
     left.sum += c.normal.dot(f);
     add_force(c, f, momentum);
-    work -= c.offset.dot(f);
+    work -= c.normal.dot(c.offset) * c.normal.dot(f);
   }
   double norm2 = 0;
   for (std::size_t b = 0; b < momentum.size(); ++b) {
@@ -66,7 +66,11 @@ Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
   return left;
 }
 
-/// No contact approaches, by more than it slides apart, where nothing moves.
+bool closes_nothing(const ContactEquation& c) {
+  return c.normal.dot(c.offset) >= 0;
+}
+
+/// No contact approaches, and what slides parts as well, where nothing moves.
 bool rest_is_admissible(const BodyProblem& problem) {
   return std::ranges::all_of(problem.contacts, [](const ContactEquation& c) {
     return c.normal.dot(c.offset) >= c.mu * tangential(c, c.offset).norm();
@@ -108,9 +112,11 @@ bool none_admissible(const BodyProblem& problem, double enough, const Admissible
 
 bool friction_may_lock(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
                        double& work) {
-  BodyProblem free = problem;
-  free.impulse.assign(problem.contacts.size(), Vec3::Zero());
-  return out_of_reach(free, enough, thresholds, work);
+  // Walls that slide by, as belts do, press nothing.
+  if (std::ranges::all_of(problem.contacts, closes_nothing)) return false;
+  BodyProblem unloaded = problem;
+  unloaded.impulse.assign(problem.contacts.size(), Vec3::Zero());
+  return out_of_reach(unloaded, enough, thresholds, work);
 }
 
 }  // namespace talus

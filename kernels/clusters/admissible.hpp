@@ -42,10 +42,11 @@ struct AdmissibleThresholds {
 bool none_admissible(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
                      double& work);
 
-/// The same of velocities with which contacts that slide part by mu |v_t| at least, and of impulses in the
-/// cones: what walls nip as a wedge that is narrower than friction holds. Coulomb's law may have an answer
-/// there all the same, or none: it has one for certain where there are such velocities (Acary, Cadoux,
-/// Lemaréchal and Malick 2011), so true is a reason why none was found, not a proof.
+/// Whether friction may hold what walls close on, as a wedge does that is narrower than twice the angle of
+/// friction. The same search, for velocities with which contacts that slide part by mu |v_t| at least, and
+/// with impulses f in the cones, of which only the work sum f_n b_n of what closes counts. Where there are
+/// such velocities Coulomb's law has an answer (Acary, Cadoux, Lemaréchal and Malick 2011); where there are
+/// none it may have: true is a reason why none was found, no proof.
 bool friction_may_lock(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
                        double& work);
 

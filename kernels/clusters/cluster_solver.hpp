@@ -25,7 +25,8 @@ struct ClusterThresholds {
   /// stored matrix (sweep_cost): so many, >= 0, and so many for each sweep that the step has had, >= 0.
   /// Beyond it the cluster is left without an answer.
   double least_budget = 500, budget_per_sweep = 20;
-  /// Parts of it that the question whether there is an answer, and the steps of coulomb_newton.hpp and
+  /// Parts of it that the question whether there is an answer (and once more, beyond the budget, where none
+  /// was found, that whether friction may lock), and the steps of coulomb_newton.hpp and
   /// proximal_newton.hpp may take, together in (0, 1); each has also what those before it leave. Without
   /// friction the second is that of steps which ask for the velocities alone.
   double admissible_share = 0.05, coulomb_share = 0.5, proximal_share = 0.4;

@@ -153,7 +153,7 @@ enum class Verdict {
   diverged,    ///< the error grows without bound
   not_finite,  ///< sweeping on cannot mend a NaN; the step's end reports it
   exhausted,   ///< max_iterations are done
-  impossible,  ///< there is no solution
+  impossible,  ///< there is no solution, or friction may lock and none was found
   stagnated,   ///< more sweeps would not make the error smaller
   stuck,       ///< likewise, but the method has another way
 };

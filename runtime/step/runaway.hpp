@@ -34,14 +34,14 @@ struct RunawayThresholds {
   double most_energy = 100;
 };
 
-/// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws RunawayError
+/// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws NoSpaceError
 /// when there is no such area any more, because walls have run through one another.
 double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
-/// or a step that missed its tolerance has far more kinetic energy than was supplied. (One that is certified
-/// has what its loads make: of a narrow wedge that a wall closes grains come far faster than the wall, and at
-/// rest rounding of positions is all the motion there is.) `energy_free`: see free_energy_of [J].
+/// or a step whose iterations did not converge has far more kinetic energy than was supplied. (Where they did
+/// it has what its loads make: of a narrow wedge that a wall closes grains come far faster than the wall, and
+/// at rest rounding of positions is all the motion there is.) `energy_free`: see free_energy_of [J].
 void check_for_runaway(const StepOutcome& outcome, double energy_free,
                        const RunawayThresholds& thresholds = {});
 

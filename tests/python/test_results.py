@@ -208,7 +208,7 @@ def test_a_damaged_file_is_named(heap_run, tmp_path, content):
 @pytest.mark.parametrize("name, content", [("results.h5", b""), ("results.h5", b"no HDF5"), ("steps.csv", b"\xff\n1\n"),
                                            ("steps.csv", b"step,time\n1\n"), ("steps.csv", b"step,time\n1,2\n"),
                                            ("steps.csv", b"time,converged\n1,1\nabc,1\n"),
-                                           ("steps.csv", b"step,converged\none,1\n")])
+                                           ("steps.csv", b"step,converged\n1,1\n2.5,1\n")])
 def test_a_damaged_table_or_file_of_frames_is_named(heap_run, tmp_path, name, content):
     other = tmp_path / "run"
     shutil.copytree(heap_run.directory, other)

@@ -61,16 +61,16 @@ def _column(name: str, cells: list[str]) -> np.ndarray:
             return np.array([cell == "1" for cell in cells], dtype=bool)
         return np.array(cells, dtype=np.str_).astype(np.int64 if name in INTEGERS else np.float64)
     except ValueError:
-        wrong = [k for k, cell in enumerate(cells) if not _is_number(cell)]
+        wrong = [k for k, cell in enumerate(cells) if not _is_number(cell, int if name in INTEGERS else float)]
         if name in INTEGERS or len(wrong) < len(cells):
-            row = wrong[0] if wrong else 0
-            raise DamagedFile(f"row {row + 2}: `{cells[row]}` in the column `{name}` is no number of its kind") from None
-        return np.array(cells, dtype=np.str_)  # a column of text that this package does not know by name
+            what = f"`{cells[wrong[0]]}` in the column `{name}`"
+            raise DamagedFile(f"row {wrong[0] + 2}: {what} is no number of its kind") from None
+        return np.array(cells, dtype=np.str_)  # texts alone, in a column that this package does not know by name
 
 
-def _is_number(cell: str) -> bool:
+def _is_number(cell: str, kind: type[int] | type[float]) -> bool:
     try:
-        float(cell)
+        kind(cell)
     except ValueError:
         return False
     return True

@@ -31,10 +31,7 @@ MotionPart read_part(const toml::table& table, const std::string& path, const st
   if (part.kind == MotionPart::Kind::table) {
     part.file = (folder / part.file).lexically_normal().string();
     if (!std::filesystem::is_regular_file(part.file))
-      fail_at(
-          *table.get("file"), path + ".file",
-          fmt::format("{}: {}", std::filesystem::is_directory(part.file) ? "is a directory" : "no such file",
-                      part.file));
+      fail_at(*table.get("file"), path + ".file", fault_of_file(part.file));
     part.table = std::make_shared<const MotionTable>(read_motion(part.file));
   }
   read_axis(table, path, part);

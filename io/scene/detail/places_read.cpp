@@ -33,7 +33,8 @@ class Collector {
  private:
   void note(const std::string& words, const toml::node& node) {
     const toml::source_region& source = node.source();
-    if (source.path && *source.path == file_) places.emplace(words, static_cast<int>(source.begin.line));
+    const bool of_file = source.path && *source.path == file_;
+    places.emplace(words, of_file ? static_cast<int>(source.begin.line) : 0);
   }
 
   void add_named(const toml::array& tables, const std::string& kind) {
@@ -47,6 +48,8 @@ class Collector {
       const std::string words = fmt::format("{} '{}'", kind, name_of(*table, kind, k));
       note(words, node);
       add(*table, words, ": ");
+      // As two of them are named.
+      note(fmt::format("{}s '{}'", kind, name_of(*table, kind, k)), node);
     }
   }
 

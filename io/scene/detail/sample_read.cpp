@@ -65,9 +65,7 @@ void check_file(const toml::table& table, const std::string& path, const std::fi
                 SampleSpec& sample) {
   const std::filesystem::path file = (folder / sample.file).lexically_normal();
   if (!std::filesystem::is_regular_file(file))
-    fail_at(*table.get("file"), path + ".file",
-            fmt::format("{}: {}", std::filesystem::is_directory(file) ? "is a directory" : "no such file",
-                        file.string()));
+    fail_at(*table.get("file"), path + ".file", fault_of_file(file));
   sample.file = file.string();
 }
 

@@ -25,11 +25,7 @@ std::string found_text(const toml::node& node) {
     return fmt::format("the text '{}'", held);
   }
   if (const auto* whole = node.as_integer()) return fmt::format("the integer {}", whole->get());
-  if (const auto* real = node.as_floating_point()) {
-    const double value = real->get();
-    const bool whole = value == std::round(value) && std::abs(value) < 1e15;
-    return "the real " + toml_text(value) + (whole ? fmt::format(" (write {:.0f})", value) : "");
-  }
+  if (const auto* real = node.as_floating_point()) return "the real " + toml_text(real->get());
   if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";
   if (const auto* list = node.as_array()) return fmt::format("a list of {}", list->size());
   return node.is_table() ? "a table" : "a date or time";
@@ -64,6 +60,10 @@ struct Reader {
   }
 
   std::int64_t integer(const toml::node& node) const {
+    if (const auto* real = node.as_floating_point();
+        real != nullptr && real->get() == std::round(real->get()))
+      fail_at(node, path,
+              fmt::format("expected {}, got {}: leave out the point", expected, found_text(node)));
     if (!node.is_integer()) wrong_type(node);
     return within_range(node, node.as_integer()->get());
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <string>
 
 #include "io/scene/detail/scene_key.hpp"
@@ -34,6 +35,12 @@ std::string toml_text(const std::vector<T>& values) {
   std::vector<std::string> texts;
   for (const T& value : values) texts.push_back(toml_text(value));
   return fmt::format("[{}]", listed(texts));
+}
+
+/// Why a file cannot be read.
+inline std::string fault_of_file(const std::filesystem::path& file) {
+  return fmt::format("{}: {}", std::filesystem::is_directory(file) ? "is a directory" : "no such file",
+                     file.string());
 }
 
 /// What `part` holds for the key, as TOML; "" when it holds nothing.

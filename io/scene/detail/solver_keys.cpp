@@ -56,7 +56,9 @@ Section<SolverSettings> solver_keys() {
           key<SolverSettings>(
               "velocity_tolerance", "", positive,
               "Bound on the estimated error of the velocities in clusters of contacts that are "
-              "too large for a direct solve, over what these exchange (velocity_error).",
+              "too large for a direct solve, over what these exchange (velocity_error; with friction it may "
+              "tell "
+              "more, unless this is set).",
               &SolverSettings::velocity_tolerance)
               .or_auto(0,
                        "`balance_tolerance`; in stages with friction ten times that, but at most 1 unless it "

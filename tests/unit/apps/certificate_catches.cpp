@@ -80,6 +80,13 @@ TEST(CertificateAudit, OfAWallThatFliesThroughAnotherEndsARunThatHasFooledNobody
   EXPECT_TRUE(run.gave_up());
 }
 
+TEST(CertificateAudit, OfGrainsInAWedgeLetsThemGoFarForEachOverlapThatIsUndone) {
+  // Half an angle of 0.0094: a grain goes a hundred times as far as its walls let go of it.
+  const AuditedRun run = audited(make_scene("wedge", 940968, {}), 20);
+  for (const AuditedStep& step : run.steps) EXPECT_NE(step.judged, Judged::other_problem) << step.why;
+  EXPECT_GE(within_their_claims(run), 10);
+}
+
 TEST(CertificateAudit, OfRowsBetweenWallsThatBuckleOnlyUnderTwiceTheForceIsNotDeceived) {
   // In step 2 rows of five grains, which lean by 10^-4, still close by 10^-7 m/s where others part by 10^-2.
   MadeScene made = make_scene("lattice", 1036, {});

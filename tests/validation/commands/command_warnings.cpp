@@ -79,7 +79,8 @@ TEST_F(Warnings, OfLengthsInOtherUnitsAndPlacesThatAreTooFarAway) {
 }
 
 TEST_F(Warnings, NameTheLineOfWhatTheySpeakOf) {
-  EXPECT_NE(of(replaced(column_scene, "2600", "2.6")).find("scene.toml:5: material: "), std::string::npos);
+  EXPECT_NE(of(replaced(column_scene, "2600", "2.6")).find("scene.toml:6: material.density = "),
+            std::string::npos);
 }
 
 TEST_F(Warnings, OfADensityInOtherUnits) {

@@ -39,6 +39,9 @@ TEST(SceneErrors, WrongTypeSaysWhatWasExpectedAndFound) {
                       "expected list of 3 reals [m/s²], got a list of 2");
   expect_line_refused("#top", "rotation = 1", "rotation", "expected true or false, got the integer 1");
   expect_line_refused("#top", "seed = 1.5", "seed", "expected integer, got the real 1.5");
+  expect_line_refused("#top", "seed = 3.0", "seed", "got the real 3.0: leave out the point");
+  expect_line_refused("#top", "description = high", "", "texts stand in quotes");
+  expect_line_refused("#wall", "group = \"drum\"", "wall[0].group", "there are none");
   expect_line_refused("#tail", "[[solver]]", "solver", "must be a table: write [solver]");
   expect_refused(replaced(scene_with(), "[[stage]]", "[stage]"), "[stage]", "stage", "write [[stage]]");
 }
@@ -114,6 +117,8 @@ TEST(SceneErrors, MissingFilesAreNamed) {
   std::string text =
       replaced(scene_with(), "count = 10\nbase = [0.1, 0.1]\nradius = 0.01", "file = \"nowhere.csv\"");
   expect_refused(replaced(text, "deposition", "bodies"), "nowhere.csv", "sample.file", "no such file");
+  expect_refused(replaced(replaced(text, "deposition", "bodies"), "nowhere.csv", "."),
+                 "file = ", "sample.file", "is a directory");
   EXPECT_THROW(load_scene("no/such/scene.toml"), SceneError);
 }
 

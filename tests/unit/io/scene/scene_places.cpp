@@ -63,6 +63,7 @@ TEST(ScenePlaces, AMessageHasTheLineOfWhatItNames) {
   EXPECT_EQ(line_of(all, "", "stage 'fall-further' is odd"), 24) << "not the stage whose name it begins with";
   EXPECT_EQ(line_of(all, "", "grain 3 lies behind wall 'z-'; move it"), 18);
   EXPECT_EQ(line_of(all, "", "insert 'insert-1' lies in insert 'sand'"), 9) << "of several the first";
+  EXPECT_EQ(line_of(all, "wall", "walls 'z-' and 'z+' cross"), 18);
   EXPECT_EQ(line_of(all, "", "samples overlap"), 0) << "these are more than the word";
   EXPECT_EQ(line_of(all, "", "the gravity is odd"), 0) << "a word in a sentence is none of a key";
   EXPECT_EQ(line_of(all, "wall", "grain 3 lies behind wall 'z-'"), 18) << "a name says more than a table";
@@ -70,9 +71,10 @@ TEST(ScenePlaces, AMessageHasTheLineOfWhatItNames) {
 }
 
 TEST(ScenePlaces, WhatAnOverrideHasBroughtInHasNone) {
-  EXPECT_EQ(line_of(places({"stage.fall.end.steps=2"}), "", "stage 'fall': end.steps is odd"), 23)
-      << "the line of what it changed";
+  EXPECT_EQ(line_of(places({"stage.fall.end.steps=2"}), "", "stage 'fall': end.steps is odd"), 0);
   EXPECT_EQ(line_of(places({"solver.tolerance=1e-4"}), "solver.tolerance", ""), 0);
+  EXPECT_EQ(line_of(places({"material.density=2"}), "material.density", ""), 0) << "not that of its table";
+  EXPECT_EQ(line_of(places({"material.density=2"}), "", "material.density = 2 is odd"), 0);
 }
 
 TEST(ScenePlaces, AGrainBehindAWallIsRefusedAtTheLineOfTheWall) {

@@ -156,6 +156,21 @@ TEST(Admissible, AWedgeHoldsWhatItNipsBelowTheAngleOfFriction) {
     }
 }
 
+/// A grain that does not turn, between a floor and a lid that slides by, has an answer: it slides at one of
+/// them. So has one on a belt that a weight presses.
+TEST(Admissible, WhatSlidesByLocksNothing) {
+  BodyProblem problem;
+  add_grain(problem, Vec3::Zero(), 0.5);
+  add_contact(problem, 0, -1, Vec3::UnitZ(), 0.5, 0);
+  add_contact(problem, 0, -1, -Vec3::UnitZ(), 0.5, 1);
+  problem.contacts[1].offset = 0.3 * Vec3::UnitX();
+  for (const double weight : {0.0, 1.0}) {
+    problem.bodies[0].free.u = -weight * Vec3::UnitZ();
+    double work = 1e9;
+    EXPECT_FALSE(friction_may_lock(problem, enough, {}, work)) << weight;
+  }
+}
+
 TEST(Admissible, KeepsToItsWork) {
   double work = 1;
   EXPECT_FALSE(none_admissible(row(100, 0, 1, 0), enough, {}, work));
