@@ -9,6 +9,7 @@
 
 #include "apps/report/run_folder.hpp"
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/patience.hpp"
 #include "apps/shared/print.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
@@ -79,6 +80,10 @@ Frame frame_of(const Conversion& todo, std::size_t k) {
   return todo.shapes.clump ? io::frame_of_balls(frame, todo.shapes) : frame;
 }
 
+void tell(Patience& patience, std::size_t done, const Conversion& todo) {
+  patience.tell([&] { return fmt::format("{} of {} frames written", done, todo.frames); });
+}
+
 void write_lammps(const Conversion& todo, const fs::path& draft) {
   std::ofstream file(draft, std::ios::binary);
   const std::size_t balls = todo.shapes.clump ? todo.shapes.clump->balls.size() : 1;
@@ -86,7 +91,9 @@ void write_lammps(const Conversion& todo, const fs::path& draft) {
   std::size_t filled = 0;
   Frame like = frame_of(todo, filled);
   while (like.id.empty() && ++filled < todo.frames) like = frame_of(todo, filled);
+  Patience patience;
   for (std::size_t k = 0; k < todo.frames; ++k) {
+    tell(patience, k, todo);
     const Frame frame = frame_of(todo, k);
     file << io::lammps_dump(frame, balls, frame.id.empty() ? like : frame);
   }
@@ -96,7 +103,11 @@ void write_lammps(const Conversion& todo, const fs::path& draft) {
 
 void write_vtkhdf(const Conversion& todo, const fs::path& draft) {
   io::VtkHdfWriter writer(draft);
-  for (std::size_t k = 0; k < todo.frames; ++k) writer.append(frame_of(todo, k));
+  Patience patience;
+  for (std::size_t k = 0; k < todo.frames; ++k) {
+    tell(patience, k, todo);
+    writer.append(frame_of(todo, k));
+  }
   writer.close();
 }
 

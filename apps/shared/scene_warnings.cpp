@@ -46,8 +46,8 @@ void add_friction(const io::Scene& scene, std::vector<std::string>& warnings) {
                                    mu <= 100 ? fmt::format("; {:g} % are {:g}", mu, mu / 100) : ""));
 }
 
-/// The largest boulders of a rock fall [m].
-constexpr double largest_stone = 5;
+/// The largest boulders of a rock fall, and the largest grains that may be meant in mm [m].
+constexpr double largest_stone = 5, largest_in_mm = 1000;
 
 /// Positions whose last bit is more than this part of a radius leave gaps to chance.
 constexpr double coarse = 1e-6;
@@ -56,8 +56,9 @@ void add_lengths(const Sample& sample, std::vector<std::string>& warnings) {
   if (sample.size() == 0) return;
   const double smallest = *std::ranges::min_element(sample.radius);
   if (smallest > largest_stone)
-    warnings.push_back(fmt::format("sample: the smallest grain has a radius of {:g} m; {:g} mm are {:g} m",
-                                   smallest, smallest, smallest / 1000));
+    warnings.push_back(fmt::format(
+        "sample: the smallest grain has a radius of {:g} m{}", smallest,
+        smallest > largest_in_mm ? "" : fmt::format("; {:g} mm are {:g} m", smallest, smallest / 1000)));
   double farthest = 0;
   for (const Vec3& x : sample.x) farthest = std::max(farthest, x.cwiseAbs().maxCoeff());
   const double bit = farthest * std::numeric_limits<double>::epsilon();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+import re
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, MutableMapping
@@ -126,7 +127,9 @@ class Scene(MutableMapping[str, Any]):
             self.write(path)
             ended = command.call([command.find_program(program), "run", str(path), "--dry-run"])
             if ended.returncode != 0:
-                raise SceneError(command.message_of(ended.stderr).replace(str(path), path.name))
+                # Lines are those of a file that nobody has.
+                said = command.message_of(ended.stderr)
+                raise SceneError(re.sub(re.escape(str(path)) + r"(:\d+)?", lambda _: path.name, said))
             return Scene(tomllib.loads(ended.stdout), folder, self.name)
 
 
