@@ -142,17 +142,14 @@ void print_grains(const Terminal& terminal, const Simulation& simulation) {
 
 /// Overlaps are a matter of the time step alone, and where walls close on grains nothing of that helps.
 std::string remedy_of_misses(const io::Summary& summary) {
-  const bool overlaps_alone = summary.unconverged_steps == summary.overlapping_steps;
+  const std::int64_t others = summary.unconverged_steps - summary.impossible_steps;
   std::string remedy;
-  if (summary.impossible_steps < summary.unconverged_steps)
-    remedy = overlaps_alone && summary.impossible_steps == 0
-                 ? "Reduce time_step"
-                 : "Raise solver.max_iterations, reduce time_step";
+  if (others > 0) remedy = "Raise solver.max_iterations, reduce time_step";
+  if (summary.impossible_steps == 0 && others == summary.overlapping_steps) remedy = "Reduce time_step";
   if (summary.impossible_steps > 0)
     remedy += fmt::format(
-        "{}more sweeps or a shorter time_step do not mend the {} in which walls close on grains: give these "
-        "room",
-        remedy.empty() ? "" : "; ", summary.impossible_steps);
+        "{} sweeps or a shorter time_step do not mend the {} in which walls close on grains: give these room",
+        remedy.empty() ? "More" : "; more", summary.impossible_steps);
   if (summary.exit_code == exit_tolerance_missed) remedy += ", or accept them with allow_unconverged = true";
   return remedy;
 }
@@ -213,10 +210,10 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         summary.worst_velocity_error,
         summary.worst_velocity_error < CertificateThresholds{}.all_wrong ? ""
                                                                          : ": there nothing is known of them",
-        solver.velocity_tolerance > 0 ? ""
-                                      : "; with friction the estimate is often ten times too large, and no "
-                                        "step is swept longer for it: "
-                                        "solver.velocity_tolerance, where it is set, bounds it");
+        solver.velocity_tolerance > 0
+            ? ""
+            : "; with friction the estimate is often ten times too large, and no step is swept longer for "
+              "it: solver.velocity_tolerance, where it is set, bounds it");
   terminal.say("results in {}", directory);
 }
 

@@ -63,8 +63,8 @@ std::string verdict(const RunFolder& run, std::size_t steps, std::size_t missed)
          "bodies.";
 }
 
-/// The loosest bound of any stage; 0: not known.
-/// 0 where no step is held to a tolerance: with friction more is told than what steps are swept for.
+/// The loosest bound of any stage; 0 where it is not known, or none holds: with friction more is told than
+/// what steps are swept for.
 double velocity_allowed(const RunFolder& run) {
   if (!run.scene) return 0;
   const Setup& setup = run.scene->setup;
@@ -111,9 +111,8 @@ HtmlSections certificate_section(const RunFolder& run) {
         {"Error of velocities", "error, velocities", "velocity_error", velocity_allowed(run),
          "In clusters of contacts that are too large for a direct solve: estimated momentum of the errors "
          "of velocities, over what these contacts exchange; with friction over the largest impulse of a "
-         "wall, if that is less, often ten times too large, and no bound unless velocity_tolerance is set; "
-         "1: "
-         "nothing is known."}));
+         "wall, if that is less, often ten times too large, and no bound unless velocity_tolerance is set. "
+         "1 says that nothing is known."}));
   return {section};
 }
 
