@@ -91,8 +91,7 @@ HtmlSections certificate_section(const RunFolder& run) {
       bounded_figure(run,
                      {"Error of the contacts", "error, rms", "error_rms", run.scene ? solver.tolerance : 0,
                       "How far contacts are from Signorini's and Coulomb's laws: the natural map, rms over "
-                      "all contacts, "
-                      "over the velocity scale of the step."}),
+                      "all contacts, over the velocity scale of the step."}),
       bounded_figure(
           run, {"Error of the worst contact", "error, largest", "error_max",
                 run.scene ? solver.worst_allowed() : 0, "The same of the contact that is furthest off."}),
@@ -102,8 +101,7 @@ HtmlSections certificate_section(const RunFolder& run) {
                 "momentum, whichever is larger."}),
       bounded_figure(run, {"Overlap", "overlap", "overlap", run.scene ? solver.overlap_tolerance : 0,
                            "Largest overlap at the end of the step, beyond those that the sample began with, "
-                           "over the smaller "
-                           "radius of the pair."})};
+                           "over the smaller radius of the pair."})};
   const auto& velocity_error = run.steps["velocity_error"];
   if (std::ranges::any_of(velocity_error, [](double e) { return e > 0; }))
     section.figures.push_back(bounded_figure(

@@ -43,8 +43,8 @@ end = { steps = 3 }
 )";
 
 /// A run of three steps, the second of which missed; "NaN" and a cut line are what a run may leave, too.
-void make_run(const ScratchDirectory& scratch, const std::string& status) {
-  const io::Scene scene = io::parse_scene(scene_text, "fall.toml");
+void make_run(const ScratchDirectory& scratch, const std::string& status, const std::string& more = "") {
+  const io::Scene scene = io::parse_scene(scene_text + more, "fall.toml");
   write(scratch / "scene.resolved.toml", io::resolved_scene(scene));
   write(
       scratch / "run.json",
@@ -52,12 +52,11 @@ void make_run(const ScratchDirectory& scratch, const std::string& status) {
             "seed": 7}, "summary": {"status": ")" +
           status + R"(", "digest": "0123456789abcdef", "message": ""}})");
   write(scratch / "steps.csv",
-        "step,time,time_step,contacts,active,iterations,error_rms,error_max,balance,overlap,kinetic_"
-        "translation,"
-        "kinetic_rotation,wall_s,converged\n"
-        "1,0.001,0.001,1,1,10,1e-4,1e-3,1e-3,0,1,0,0.01,1\n"
-        "2,0.002,0.001,1,1,10,5e-2,0.5,nan,0,1,0,0.01,0\n"
-        "3,0.003,0.001,1,1,10,1e-4,1e-3,1e-3,0,1,0,0.01,1\n"
+        "step,time,time_step,contacts,active,iterations,error_rms,error_max,balance,velocity_error,overlap,"
+        "kinetic_translation,kinetic_rotation,wall_s,converged\n"
+        "1,0.001,0.001,1,1,10,1e-4,1e-3,1e-3,0.8,0,1,0,0.01,1\n"
+        "2,0.002,0.001,1,1,10,5e-2,0.5,nan,0.9,0,1,0,0.01,0\n"
+        "3,0.003,0.001,1,1,10,1e-4,1e-3,1e-3,0.1,0,1,0,0.01,1\n"
         "4,0.00");
   write(scratch / "walls.csv",
         "step,time,wall,position,velocity,force_x,force_y,force_z\n1,0.001,floor,0,0,0,3,4\n2,0.002,floor,0,"
@@ -80,6 +79,18 @@ TEST(RunReport, SaysWhatWasRunAndHowManyStepsMissed) {
   EXPECT_TRUE(has(page, "talus run &apos;my scene.toml&apos;") || has(page, "talus run 'my scene.toml'"));
   EXPECT_TRUE(has(page, "0123456789abcdef"));
   EXPECT_TRUE(has(page, "tolerance 0.001")) << "it is drawn";
+}
+
+TEST(RunReport, DrawsABoundOfVelocitiesWithFrictionWhereTheSceneSetsOne) {
+  const ScratchDirectory unset, set;
+  make_run(unset, "done");
+  make_run(set, "done", "[solver]\nvelocity_tolerance = 0.37\n");
+  const std::string without = run_report(unset.path()), with = run_report(set.path());
+  EXPECT_TRUE(has(without, "Error of velocities"));
+  EXPECT_TRUE(has(with, "tolerance 0.37"));
+  EXPECT_TRUE(has(with, "beyond its tolerance: 2"));
+  // Steps are swept for 0.5 there, and more may be told of one that converged.
+  EXPECT_FALSE(has(without, "tolerance 0.5") || has(without, "beyond its tolerance: 2"));
 }
 
 TEST(RunReport, IsWrittenWhileTheRunGoesOn) {

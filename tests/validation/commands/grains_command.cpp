@@ -116,6 +116,18 @@ TEST_F(Grains, AStepWithInsertionsCanBeStudied) {
   EXPECT_EQ(outcome.code, 0) << outcome.messages;
 }
 
+TEST_F(Grains, WithNoneAtTheBeginningThereIsNothingToCut) {
+  write(at("rain.toml"), rain);
+  for (const std::string command :
+       {"partition rain.toml --subdomains 2", "study scaling rain.toml --cores 1"}) {
+    const Outcome outcome = CommandTest::run(command + " --out cut");
+    EXPECT_EQ(outcome.code, 2) << command;
+    EXPECT_NE(outcome.messages.find("no grain is there at the beginning"), std::string::npos)
+        << outcome.messages;
+    EXPECT_FALSE(fs::exists(at("cut"))) << command;
+  }
+}
+
 TEST_F(Grains, ARegionBehindAWallIsWarnedOf) {
   const Outcome outcome = run(replaced(rain, "low = [0.05, -0.04, 0], high = [0.1, 0.04, 0.05]",
                                        "low = [0.05, -0.04, -0.1], high = [0.1, 0.04, 0]"),
