@@ -81,5 +81,6 @@ void make_touching(SceneBench& bench);
 void make_clumps(SceneBench& bench);
 void make_rolling(SceneBench& bench);
 void make_boulder(SceneBench& bench);
+void make_landing(SceneBench& bench);
 
 }  // namespace talus::audit

@@ -95,6 +95,23 @@ void make_wedge(SceneBench& bench) {
   if (draws.chance(0.2)) bench.add_lid(some_load(bench));
 }
 
+void make_landing(SceneBench& bench) {
+  Draws& draws = bench.draws;
+  bench.speed = 0;
+  const double a = draws.between_decades(3e-3, 0.3), s = std::sin(a);
+  bench.add_wall("left", Vec3::Zero(), {std::cos(a), 0, s});
+  bench.add_wall("right", Vec3::Zero(), {-std::cos(a), 0, s});
+  const Vec3 down = -draws.between_decades(1, 100) * bench.speed_of_fall() * Vec3::UnitZ();
+  double y = 0;
+  for (int k = bench.draw_count(1, 20); k > 0; --k) {
+    const double r = bench.draw_radius();
+    bench.add_moving({0, y + r, r / s}, r, down);
+    y += 2 * r;
+  }
+  const double large = 10 * bench.radius;  // far above the others, as a is small
+  if (draws.chance(0.3)) bench.add_moving({0, 0, large / s}, large, 3 * down);
+}
+
 void make_arch(SceneBench& bench) {
   Draws& draws = bench.draws;
   bench.speed = 0;

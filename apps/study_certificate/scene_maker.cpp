@@ -43,7 +43,8 @@ constexpr std::array families = {
     SceneFamily{"clumps", "clumps of balls that lie on one another, or meet in flight", make_clumps},
     SceneFamily{"rolling", "beams and heaps of grains that resist rolling", make_rolling},
     SceneFamily{"boulder", "a boulder of up to 1000 radii that grains lean on or roll against",
-                make_boulder}};
+                make_boulder},
+    SceneFamily{"landing", "grains that land in a narrow V, where friction jams them", make_landing}};
 
 double draw_time_step(SceneBench& bench) {
   Draws& draws = bench.draws;

@@ -14,7 +14,7 @@ namespace {
 
 /// Floors of the units, as parts of other quantities of the step.
 struct Floors {
-  double walls = 1e-2;      ///< of the largest wall impulse: least momentum exchanged
+  double walls = 1e-8;      ///< of the largest wall impulse: least momentum exchanged
   double motion = 1e-9;     ///< of the momentum of all: less is rounding
   double exchange = 1e-2;   ///< of the momentum exchanged: least wall impulse
   double contact = 1e-3;    ///< likewise: least contact impulse

@@ -151,8 +151,11 @@ std::string html(const std::vector<Row>& rows, const std::string& summary) {
   return text + "</tbody></table>\n</body></html>\n";
 }
 
-std::string summary_of(const std::vector<Row>& rows, double seconds) {
-  std::string text = fmt::format("{} scenes in {:.0f} s:", rows.size(), seconds);
+/// `asked`: number of scenes, of which `rows` may be the first ones.
+std::string summary_of(const std::vector<Row>& rows, std::size_t asked, double seconds) {
+  std::string text = rows.size() == asked ? fmt::format("{} scenes", asked)
+                                          : fmt::format("{} of {} scenes", rows.size(), asked);
+  text += fmt::format(" in {:.0f} s:", seconds);
   for (Verdict verdict : {Verdict::right, Verdict::certified, Verdict::honest, Verdict::refused,
                           Verdict::wrong, Verdict::failed})
     text += fmt::format(" {} {}{}",
@@ -182,18 +185,20 @@ int stability_command(const StabilityOptions& options) {
   try {
     const auto start = std::chrono::steady_clock::now();
     std::vector<Row> rows;
+    std::string summary;
     print_out("{}", table_head());
     for (const Scene& scene : scenes) {
       std::fflush(nullptr);  // the process of the scene must not print again what waits here
       const Outcome outcome = run_scene_apart(scene, options.settings);
       rows.push_back({scene, outcome, as_expected(scene, outcome, options.settings)});
       print_out("{}", table_line(rows.back()));
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      summary = summary_of(rows, scenes.size(), seconds);
+      // Behind each scene: they are kept if the next one is stopped.
+      io::write_whole(directory + "/stability.csv", csv(rows));
+      io::write_whole(directory + "/stability.html", html(rows, summary));
     }
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const std::string summary = summary_of(rows, seconds);
     print_out("\n{}\n", summary);
-    io::write_whole(directory + "/stability.csv", csv(rows));
-    io::write_whole(directory + "/stability.html", html(rows, summary));
     print_error("talus: stability.csv and stability.html in {}\n", directory);
     int code = exit_done;
     for (const Row& row : rows)

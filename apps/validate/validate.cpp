@@ -82,14 +82,16 @@ io::HtmlTable table_of(const Judged& one) {
   return table;
 }
 
-ReportPage page_of(const std::vector<Judged>& all, int failed, double seconds) {
+/// `asked`: number of cases, of which `all` may be the first ones.
+ReportPage page_of(const std::vector<Judged>& all, std::size_t asked, int failed, double seconds) {
   ReportPage page;
   page.title = "Talus beside the literature";
+  const std::string cases =
+      all.size() == asked ? fmt::format("{}", asked) : fmt::format("{} of {}", all.size(), asked);
   page.introduction = fmt::format(
       "{} cases in {:.0f} s; {} numbers out of their bands. {} Scatter is the standard error over seeds; a "
-      "number "
-      "without a band is information.",
-      all.size(), seconds, failed, where_and_when());
+      "number without a band is information.",
+      cases, seconds, failed, where_and_when());
   page.tables.emplace_back("validation.csv", csv(all));
   for (const Judged& one : all) {
     const std::string text = fmt::format("{}. {:.1f} s, {} steps, {} over their tolerance.", one.sentence,
@@ -131,8 +133,9 @@ int validate_command(const ValidateOptions& options) {
       all.push_back({std::string(one.name), std::string(one.sentence), std::move(result), since(start)});
       print_case(all.back());
       for (const Measure& m : all.back().result.measures) failed += m.judged() && !m.holds() ? 1 : 0;
+      // Behind each case: what took an hour is kept if the next one is stopped.
+      write_report(directory, page_of(all, some.size(), failed, since(began)));
     }
-    write_report(directory, page_of(all, failed, since(began)));
     print_error("talus: validation.csv and report.html in {}\n", directory);
     if (failed > 0) print_error("talus: error: {} numbers are out of their bands\n", failed);
     return failed > 0 ? exit_failure : exit_done;

@@ -61,7 +61,7 @@ class Groups {
     own.scale = std::max(scale_of(row, thresholds_), own.floor);
     own.noise = thresholds_.rounding * most_momentum(row[mass], row[incoming]);
     const double still = thresholds_.still * row[mass] * goal_.still / enough_;
-    own.lopsided = still > thresholds_.interest * own.scale && lopsided(problem, thresholds_.lopsided);
+    own.lopsided = still > thresholds_.slight * own.scale && lopsided(problem, thresholds_.lopsided);
     if (!own.lopsided) {
       own.scale = std::max(own.scale, still);
       own.noise = std::max(own.noise, still);

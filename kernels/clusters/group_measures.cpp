@@ -46,7 +46,7 @@ double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
   // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
   const double sound = most_momentum(row[mass], row[incoming]) + row[mass] * row[fastest];
   return std::max({std::min(row[gained], sound),
-                   row[drive] > 0 ? row[mass] * row[drive] : thresholds.interest * row[pressed],
+                   row[drive] > 0 ? row[mass] * row[drive] : thresholds.pressed * row[pressed],
                    thresholds.held * row[pulls],
                    thresholds.rounding * most_momentum(row[mass], row[incoming])});
 }

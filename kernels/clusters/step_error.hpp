@@ -17,7 +17,9 @@ namespace talus {
 struct StepErrorThresholds {
   ClusterThresholds cluster;
   /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them.
-  double interest = BalanceThresholds{}.interest;
+  /// Small, as grains that friction jams between walls keep the forces of their landing: a ball of which the
+  /// walls bear 10⁵ times its weight must still not rise.
+  double pressed = 1e-8;
   /// Of what all clusters do, per mass, in (0, 1): one that does less is measured by this part of it, and the
   /// impulses of its contacts, too. What happens elsewhere in a step must not hide that a column at rest
   /// falls: a ball that hits the floor beside it at 5 m/s does 5000 times as much, per mass.
@@ -42,6 +44,8 @@ struct StepErrorThresholds {
   /// Heaviest over lightest body of a group, > 1, beyond which that momentum is not of all its mass, but what
   /// the answer changes by (felt_rounding.hpp).
   double lopsided = 100;
+  /// Part of the scale of a group, in (0, 1): rounding that makes less is not looked at as closely as that.
+  double slight = 1e-2;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
   /// nothing of what they have not.
   double unknown = 1;
@@ -87,8 +91,8 @@ struct ErrorGoal {
 ///
 /// The scale of a group is sum m |V(r) - V_free|, what its contacts do, with cohesion and moments, as far as
 /// what comes in explains it; or the speed of driven walls times its mass, if that is more; where no wall is
-/// driven, at least a hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed
-/// at rest gain nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters
+/// driven, at least what StepErrorThresholds::pressed says of the impulses at walls, as grains pressed at
+/// rest gain nothing; never less than a millionth (StepErrorThresholds::elsewhere) of what all clusters
 /// do, by its share of the mass, nor of what cohesion holds it with, nor than what rounding leaves of its own
 /// momentum, and where it is not lopsided of that of all its mass.
 StepError step_error(std::span<const BodyProblem> parts, const PartLink& link, const ErrorGoal& goal,

@@ -208,5 +208,28 @@ TEST(CertifiedSteps, OfAGrainThatHeavyBallsJamKnowWhatItBears) {
   EXPECT_LT(wrong, 1e-2 * largest);
 }
 
+// Friction keeps it jammed: each wall bears 10⁵ times its weight from then on, and of so much next to nothing
+// lifted the ball in the step behind its landing, against gravity.
+TEST(CertifiedSteps, OfABallThatLandedInANarrowWedgeLeaveItAtRest) {
+  constexpr double half_angle = 0.005, step = 1e-5;
+  for (const double friction : {0.05, 0.5}) {
+    Scene scene(step);
+    scene.stage().gravity = {0, 0, -g_earth};
+    scene.friction(friction);
+    scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-3;
+    scene.wall("left", Vec3::Zero(), {std::cos(half_angle), 0, std::sin(half_angle)});
+    scene.wall("right", Vec3::Zero(), {-std::cos(half_angle), 0, std::sin(half_angle)});
+    scene.sphere({0, 0, radius / std::sin(half_angle)}, radius, 1.4, {0, 0, -10});
+    Experiment run(std::move(scene));
+    ASSERT_TRUE(run.step().converged) << "it lands";
+    for (int k = 2; k <= 6; ++k) {
+      ASSERT_TRUE(run.step().converged) << "step " << k;
+      const Velocity& v = run.simulation().state().bodies.velocity[0];
+      EXPECT_LT(Vec3(v.u[0], v.u[1], v.u[2]).norm(), 2e-3 * step * g_earth)
+          << "step " << k << ", friction " << friction;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace talus::validation::certified_heaps_test
