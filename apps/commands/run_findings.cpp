@@ -80,10 +80,11 @@ void add_misses(const Simulation& simulation, const Tally& tally, Findings& all)
 void add_grains(const Simulation& simulation, Findings& all) {
   for (const InsertReport& insert : simulation.inserted()) {
     if (simulation.finished() && insert.placed == 0 && insert.no_room == 0)
-      all.push_back(fmt::format(
-          "insert '{}' placed no grain: none was due before the run ended. Its `stage`, `from` and "
-          "`until` leave it no time in this run, or the first that its rate brings comes later",
-          insert.name));
+      all.push_back(
+          fmt::format("insert '{}' placed no grain: none was due before the run ended. Its `stage`, `from`, "
+                      "`until` and `interval` leave it no time in this run, or the first that its rate "
+                      "brings comes later",
+                      insert.name));
     if (insert.no_room > 0 && insert.waiting > 0)
       all.push_back(fmt::format(
           "insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "

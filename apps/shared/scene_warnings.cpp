@@ -79,6 +79,34 @@ void add_endless_stages(const io::Scene& scene, std::vector<std::string>& warnin
                                      stage.name, *stage.end.time, *stage.end.time / stage.time_step));
 }
 
+/// Time by which the stages named, or all, have ended [s], infinity where that is open.
+double latest_end(const io::Scene& scene, const std::string& only) {
+  double sum = 0;
+  for (const Stage& stage : scene.setup.stages) {
+    if (!only.empty() && stage.name != only) continue;
+    const double longest = stage.chooses_time_step ? stage.time_step_max : stage.time_step;
+    double time = stage.end.time ? *stage.end.time + longest : INFINITY;
+    if (stage.end.steps && longest > 0)
+      time = std::min(time, static_cast<double>(*stage.end.steps) * longest);
+    sum += time;
+  }
+  return sum;
+}
+
+/// What is to happen when the run has ended.
+void add_late(const io::Scene& scene, std::vector<std::string>& warnings) {
+  for (const RemoveRule& rule : scene.setup.removes)
+    if (const double end = latest_end(scene, rule.times.stage); !rule.at.empty() && rule.at.back() > end)
+      warnings.push_back(fmt::format("remove '{}': at = {:g} s is never reached: {} by {:g} s", rule.name,
+                                     rule.at.back(),
+                                     rule.times.stage.empty() ? "the run ends" : "its stage ends", end));
+  const double end = latest_end(scene, "");
+  for (const ProbeRule& rule : scene.setup.probes)
+    if (rule.every && !rule.every_steps && *rule.every > end)
+      warnings.push_back(fmt::format("probe '{}': every = {:g} s is never reached: the run ends by {:g} s",
+                                     rule.name, *rule.every, end));
+}
+
 /// A belt moves along its surface only: of a motion along the normal nothing but rounding is left.
 void add_still_belts(const io::Scene& scene, std::vector<std::string>& warnings) {
   constexpr double rounding = 1e-9;
@@ -277,6 +305,7 @@ std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sa
   add_friction(scene, warnings);
   add_lengths(sample, warnings);
   add_endless_stages(scene, warnings);
+  add_late(scene, warnings);
   add_still_belts(scene, warnings);
   if (const auto parts = static_cast<std::size_t>(scene.setup.decomposition.subdomains);
       parts > std::max<std::size_t>(1, sample.size()) && scene.setup.inserts.empty())

@@ -17,8 +17,6 @@ constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
 constexpr int inner_steps = 40, halvings = 4;
 /// Part of the law's residual to which a problem around a centre is solved.
 constexpr double inner_part = 1e-2;
-/// Impulses that grow so many times over what the step can ask for: there is no answer.
-constexpr double pumped = 1e6;
 /// Least momentum exchanged, kinetic norm, over the largest impulse.
 constexpr double floor_of_exchange = 1e-2;
 /// Of a system with a cell, solved by parts: so many refinements at most, until so much of its right side is
@@ -255,7 +253,7 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) con
   Vector s = scaled(r);
   NewtonResult result;
   const auto residual = [&] {
-    const bool grown = s.cwiseAbs().maxCoeff() > pumped * goal.unit;
+    const bool grown = s.cwiseAbs().maxCoeff() > goal.pumped * goal.unit;
     return grown ? 1 : law(s, s, 0).cwiseAbs().maxCoeff() / goal.unit;
   };
   result.residual = residual();

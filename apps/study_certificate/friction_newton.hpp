@@ -39,6 +39,7 @@ class FrictionNewton {
   struct Goal {
     double unit, enough;
     int most;
+    double pumped;  ///< ReferenceLimits::pumped
   };
   NewtonResult improve(std::vector<Vec3>& r, const Goal& goal) const;
   /// Of the impulses that meet the law to `enough` over `unit`, as redundant contacts leave many, those next

@@ -250,7 +250,8 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.residual = reference.error = reference.exchanged = 1;
   Sweeps sweeps(problem);
   const FrictionNewton newton(problem, limits.speeds);
-  const FrictionNewton::Goal goal{newton.unit(run), sharpness * limits.residual, limits.proximal_steps};
+  const FrictionNewton::Goal goal{newton.unit(run), sharpness * limits.residual, limits.proximal_steps,
+                                  limits.pumped};
   const std::size_t contacts = sweeps.contacts();
   const Forces forces(newton, run, goal.unit, limits);
   Vector r = joined(run);

@@ -12,25 +12,22 @@ namespace talus::audit {
 
 namespace {
 
-/// Floors of the units, as parts of other quantities of the step.
+/// What else errors are compared with at least, as parts of other quantities of the step, and what is no
+/// error: these the judge grants of its own.
 struct Floors {
-  double walls = 1e-8;      ///< of the largest wall impulse: least momentum exchanged
   double motion = 1e-9;     ///< of the momentum of all: less is rounding
   double exchange = 1e-2;   ///< of the momentum exchanged: least wall impulse
   double contact = 1e-3;    ///< likewise: least contact impulse
   double load = 1e-2;       ///< of a cluster's weight in a step: least momentum it exchanges
   double cluster = 1e-9;    ///< of a cluster's own momentum, likewise: grains that graze one another
-  double elsewhere = 1e-6;  ///< of what all exchange, by the cluster's share of the mass (docs/theory.md):
-                            ///< less is what the end of an earlier motion has left of it
-  double held = 1e-6;       ///< of what cohesion holds with: least momentum exchanged
   double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
-  double lopsided = 100;    ///< heaviest over lightest body, beyond which the mass of all says little
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
   double corrected = 1e-7;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
   double undone = 2;        ///< of what is undone of all overlaps: how far that may shift a grain
 };
 constexpr Floors floors;
+constexpr ErrorUnits units;
 
 /// The speed that a wall or a flow lends a contact [m/s].
 double drive_at(const StepProblem& problem, const StepContact& contact) {
@@ -179,12 +176,12 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
   }
   double worst = 0;
   const double weight = problem.time_step * problem.gravity.norm();
-  const double elsewhere = floors.elsewhere * momentum.all_exchanged() /
+  const double elsewhere = units.elsewhere * momentum.all_exchanged() /
                            std::accumulate(problem.mass.begin(), problem.mass.end(), 1e-300);
   for (const Sums& own : sums) {
-    const double unit = std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * own.drive,
+    const double unit = std::max({own.exchanged, units.walls * own.wall_impulse, own.mass * own.drive,
                                   floors.load * own.mass * weight, floors.cluster * own.momentum,
-                                  own.mass * elsewhere, floors.held * own.held, 1e-300});
+                                  own.mass * elsewhere, units.held * own.held, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;
@@ -206,7 +203,7 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
     if (inverse > 0) weigh(1 / inverse);
   for (const Vec3& r : reference.r) most = std::max(most, r.norm());
   const bool matters = floors.rounding * all * problem.rounding_speed > claimed * most;
-  if (heaviest <= floors.lopsided * lightest || !matters) return felt;
+  if (heaviest <= units.lopsided * lightest || !matters) return felt;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.exact, false);
   std::vector<double> at_contact(reference.exact.size(), 0.0), at_wall(walls.size(), 0.0);
   // All gaps wider, all narrower, and by turns, by as many roundings as impulses are excused for: a contact
@@ -229,7 +226,7 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
   if (!any) return felt;
   // Of light grains all counts, as where there are no others: a row passes on what it makes of each.
   double light = 0;
-  for (const double mass : problem.mass) light += heaviest > floors.lopsided * mass ? mass : 0;
+  for (const double mass : problem.mass) light += heaviest > units.lopsided * mass ? mass : 0;
   for (double& one : at_contact) one += light * problem.rounding_speed;
   for (double& one : at_wall) one += light * problem.rounding_speed;
   return {at_contact, at_wall};
@@ -267,8 +264,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     speed = std::max(speed, problem.unpulled.u[k].norm());
   }
   for (const StepContact& contact : problem.contacts) held += contact.pull;
-  const double exchange = std::max({momentum.all_exchanged(), floors.walls * felt, mass * problem.drive_speed,
-                                    floors.motion * mass * speed, floors.held * held, 1e-300});
+  const double exchange = std::max({momentum.all_exchanged(), units.walls * felt, mass * problem.drive_speed,
+                                    floors.motion * mass * speed, units.held * held, 1e-300});
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     if (problem.contacts[c].is_moment()) continue;
     contact_unit = std::max(contact_unit, reference.r[c].norm());

@@ -10,9 +10,19 @@
 
 namespace talus::audit {
 
+/// Parts of other quantities of a step that what its contacts exchange counts as at least. They belong to
+/// what is claimed (docs/certificate.md), not to the judge: a test holds them against StepErrorThresholds.
+struct ErrorUnits {
+  double walls = 1e-8;      ///< of the largest wall impulse
+  double elsewhere = 1e-6;  ///< of what all exchange, by a cluster's share of the mass: less is what the end
+                            ///< of an earlier motion has left of it
+  double held = 1e-6;       ///< of what cohesion holds with
+  double lopsided = 100;    ///< heaviest over lightest body, beyond which the mass of all says little
+};
+
 /// True errors of a step, each relative, without what rounding of positions is worth (a step at rest). Let E
 /// be the momentum that the contacts exchange in the exact answer, sum m |u* - u_free| over grains, pushed
-/// walls and a cell that follows a stress, but at least a hundredth of the largest wall impulse (grains
+/// walls and a cell that follows a stress, but at least 10⁻⁸ of the largest wall impulse (grains
 /// pressed between fixed walls gain nothing), and what the speed of a driven wall, or of a
 /// driven flow over a diameter, gives to all.
 struct TrueErrors {

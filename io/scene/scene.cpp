@@ -80,14 +80,14 @@ class SceneReader {
     if (node && !node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
     return node ? *node->as_table() : nothing_;
   }
-  /// What the cell has no room for is told at its line.
+  /// What the cell has no room for is told at its line, what is wrong with a stage at that.
   template <class Check>
   void check_by_cell(const Check& check) const {
     try {
       check();
     } catch (const std::invalid_argument& error) {
       const std::string table = root_.contains("cell") ? "cell" : "stage", what = error.what();
-      fail_at(*root_.get(table), table, what.starts_with("cell: ") ? what.substr(6) : what);
+      throw error_in(scene_, table, what.starts_with("cell: ") ? what.substr(6) : what);
     }
   }
 

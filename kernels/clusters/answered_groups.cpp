@@ -56,11 +56,11 @@ class Groups {
   void measure(AnsweredGroup& own) const {
     const BodyProblem& problem = own.group.problem;
     const Measures row = measures_of(problem, goal_.faces);
-    const double share = everywhere_.mass > 0 ? row[mass] / everywhere_.mass : 0;
+    const double share = everywhere_.mass > 0 ? row[MeasureColumn::mass] / everywhere_.mass : 0;
     own.floor = thresholds_.elsewhere * everywhere_.scale * share;
     own.scale = std::max(scale_of(row, thresholds_), own.floor);
-    own.noise = thresholds_.rounding * most_momentum(row[mass], row[incoming]);
-    const double still = thresholds_.still * row[mass] * goal_.still / enough_;
+    own.noise = thresholds_.rounding * most_momentum(row[MeasureColumn::mass], row[MeasureColumn::incoming]);
+    const double still = thresholds_.still * row[MeasureColumn::mass] * goal_.still / enough_;
     own.lopsided = still > thresholds_.slight * own.scale && lopsided(problem, thresholds_.lopsided);
     if (!own.lopsided) {
       own.scale = std::max(own.scale, still);

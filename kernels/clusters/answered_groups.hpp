@@ -7,7 +7,7 @@
 
 #include "kernels/clusters/felt_rounding.hpp"
 #include "kernels/clusters/loaded_groups.hpp"
-#include "kernels/clusters/step_error.hpp"
+#include "kernels/clusters/step_error_goal.hpp"
 
 namespace talus {
 

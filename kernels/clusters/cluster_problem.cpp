@@ -5,6 +5,7 @@
 #include <iterator>
 #include <map>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "kernels/bodies/index.hpp"
@@ -37,10 +38,10 @@ std::vector<std::vector<Place>> places_of(const BodyParts& parts) {
 
 /// A contact that has yet to find its bodies in a cluster's problem.
 struct Joint {
-  Place place;
+  Place place = {};
   ContactEquation equation;  ///< first and second are not set
-  Place first, second;
-  Vec3 impulse;
+  Place first = {}, second = {};
+  Vec3 impulse = Vec3::Zero();
   RollingPart rolling = {};
   Levers levers = {};  ///< of blocks, where the equation points to none
   bool block = false;
@@ -60,113 +61,107 @@ RollingPart rolling_of(const BodyProblem& part, std::size_t k) {
   return part.rolling.empty() ? RollingPart{} : part.rolling[k];
 }
 
-/// Numbers of a body and of a contact as they travel: enough for a direct solve.
-constexpr std::size_t body_width = 23, contact_width = 50;
-
-void write(std::vector<double>& to, const Vec3& v) {
-  to.insert(to.end(), v.begin(), v.end());
+/// What of a body and of a contact travels between parts, in rows of numbers: enough for a direct solve. One
+/// list serves to write, to read and to count them, so that none is written and not read.
+template <class Row>
+void each_number(Row&& row, std::int32_t& cluster, Place& place, BodyUnknown& body) {
+  row(cluster, place.subdomain, place.number, body.mass, body.spin_mass, body.radius, body.wall, body.cell,
+      body.x, body.axis, body.shears, body.free.u, body.free.w);
 }
-void write(std::vector<double>& to, const Mat3& m) {
-  to.insert(to.end(), m.data(), m.data() + 9);
-}
-void write(std::vector<double>& to, Place place) {
-  to.insert(to.end(), {static_cast<double>(place.subdomain), static_cast<double>(place.number)});
-}
-
-void write_body(std::vector<double>& to, std::int32_t cluster, const BodyUnknown& body, Place place) {
-  to.push_back(cluster);
-  write(to, place);
-  to.insert(to.end(), {body.mass, body.spin_mass, body.radius, body.wall ? 1.0 : 0.0, body.cell ? 1.0 : 0.0});
-  write(to, body.x);
-  write(to, body.axis);
-  write(to, body.shears);
-  write(to, body.free.u);
-  write(to, body.free.w);
+template <class Row>
+void each_number(Row&& row, std::int32_t& cluster, Joint& joint) {
+  row(cluster);
+  for (Place* place : {&joint.place, &joint.first, &joint.second}) row(place->subdomain, place->number);
+  ContactEquation& c = joint.equation;
+  row(c.mu, c.pull, c.drive, c.wall, c.cell, c.normal, c.branch, c.offset, joint.impulse);
+  row(joint.rolling.arm, joint.rolling.spin, joint.rolling.moment);
+  row(joint.block, joint.levers.first, joint.levers.second);
 }
 
-/// `places`: of the contact, of its first and of its second body.
-void write_contact(std::vector<double>& to, std::int32_t cluster, const ContactEquation& c,
-                   const std::array<Place, 3>& places, const Vec3& impulse, const RollingPart& rolling) {
-  to.push_back(cluster);
-  for (const Place& place : places) write(to, place);
-  to.insert(to.end(), {c.mu, c.pull, c.drive, static_cast<double>(c.wall), static_cast<double>(c.cell),
-                       c.levers == nullptr ? 0.0 : 1.0});
-  write(to, c.normal);
-  write(to, c.branch);
-  write(to, c.offset);
-  write(to, impulse);
-  to.push_back(rolling.arm);
-  write(to, rolling.spin);
-  write(to, rolling.moment);
-  if (c.levers == nullptr) return;
-  write(to, c.levers->first);
-  write(to, c.levers->second);
-}
-
-/// Reads numbers off a row.
-class Reader {
+class RowWriter {
  public:
-  explicit Reader(std::span<const double> row) : row_(row) {}
-  double number() { return row_[next_++]; }
-  std::int32_t integer() { return static_cast<std::int32_t>(number()); }
-  Place place() {
-    const std::int32_t subdomain = integer();
-    return {subdomain, integer()};
-  }
-  Vec3 vector() {
-    next_ += 3;
-    return Eigen::Map<const Vec3>(&row_[next_ - 3]);
-  }
-  Mat3 matrix() {
-    next_ += 9;
-    return Eigen::Map<const Mat3>(&row_[next_ - 9]);
-  }
+  explicit RowWriter(std::vector<double>& to) : to_(to) {}
+  void operator()(const auto&... values) { (put(values), ...); }
 
  private:
+  template <class T>
+  void put(const T& value) {
+    if constexpr (std::is_arithmetic_v<T>)
+      to_.push_back(static_cast<double>(value));
+    else
+      to_.insert(to_.end(), value.data(), value.data() + value.size());
+  }
+  std::vector<double>& to_;
+};
+
+class RowReader {
+ public:
+  explicit RowReader(std::span<const double> row) : row_(row) {}
+  void operator()(auto&... values) { (take(values), ...); }
+
+ private:
+  template <class T>
+  void take(T& value) {
+    if constexpr (std::is_same_v<T, bool>)
+      value = row_[next_++] != 0;
+    else if constexpr (std::is_arithmetic_v<T>)
+      value = static_cast<T>(row_[next_++]);
+    else
+      for (double& number : value.reshaped()) number = row_[next_++];
+  }
   std::span<const double> row_;
   std::size_t next_ = 0;
 };
 
-void read_body(std::span<const double> row, std::vector<Pieces>& spanning) {
-  Reader from(row);
-  Pieces& to = spanning[at(from.integer())];
-  const Place place = from.place();
-  BodyUnknown body;
-  body.mass = from.number();
-  body.spin_mass = from.number();
-  body.radius = from.number();
-  body.wall = from.number() != 0;
-  body.cell = from.number() != 0;
-  body.x = from.vector();
-  body.axis = from.vector();
-  body.shears = from.vector();
-  body.free.u = from.vector();
-  body.free.w = from.vector();
-  add_body(to, body, place);
+void append(std::vector<double>& to, const std::vector<double>& row) {
+  to.insert(to.end(), row.begin(), row.end());
 }
 
-void read_contact(std::span<const double> row, std::vector<Pieces>& spanning) {
-  Reader from(row);
-  Pieces& to = spanning[at(from.integer())];
+std::vector<double> row_of_body(std::int32_t cluster, Place place, BodyUnknown body) {
+  std::vector<double> row;
+  each_number(RowWriter(row), cluster, place, body);
+  return row;
+}
+
+std::vector<double> row_of_joint(std::int32_t cluster, Joint joint) {
+  std::vector<double> row;
+  each_number(RowWriter(row), cluster, joint);
+  return row;
+}
+
+void read_body(std::span<const double> row, std::vector<Pieces>& spanning) {
+  std::int32_t cluster = 0;
+  Place place;
+  BodyUnknown body;
+  each_number(RowReader(row), cluster, place, body);
+  add_body(spanning[at(cluster)], body, place);
+}
+
+void read_joint(std::span<const double> row, std::vector<Pieces>& spanning) {
+  std::int32_t cluster = 0;
   Joint joint;
-  joint.place = from.place();
-  joint.first = from.place();
-  joint.second = from.place();
-  joint.equation.mu = from.number();
-  joint.equation.pull = from.number();
-  joint.equation.drive = from.number();
-  joint.equation.wall = from.integer();
-  joint.equation.cell = from.integer();
-  joint.block = from.number() != 0;
-  joint.equation.normal = from.vector();
-  joint.equation.branch = from.vector();
-  joint.equation.offset = from.vector();
-  joint.impulse = from.vector();
-  joint.rolling.arm = from.number();
-  joint.rolling.spin = from.vector();
-  joint.rolling.moment = from.vector();
-  if (joint.block) joint.levers = {from.matrix(), from.matrix()};
-  to.joints.push_back(std::move(joint));
+  each_number(RowReader(row), cluster, joint);
+  spanning[at(cluster)].joints.push_back(std::move(joint));
+}
+
+/// Reads the rows of all parts; a row of a filler is none.
+void read_rows(const PartLink& link, const std::vector<std::vector<double>>& rows, std::size_t width,
+               void (&read)(std::span<const double>, std::vector<Pieces>&), std::vector<Pieces>& spanning) {
+  constexpr double filler = -1;
+  const std::vector<double> all = gather_padded(link, rows, filler);
+  for (std::size_t k = 0; k + width <= all.size(); k += width)
+    if (all[k] != filler) read(std::span(all).subspan(k, width), spanning);
+}
+
+/// Contact k of a part, whose second body may be missing.
+Joint joint_of(const BodyProblem& part, std::size_t k, const std::vector<Place>& places) {
+  const ContactEquation& c = part.contacts[k];
+  return {.place = {part.subdomain, static_cast<std::int32_t>(k)},
+          .equation = c,
+          .first = places[at(c.first)],
+          .second = c.second < 0 ? Place{-1, -1} : places[at(c.second)],
+          .impulse = part.impulse[k],
+          .rolling = rolling_of(part, k)};
 }
 
 /// The pieces of the clusters that span parts, from all of them.
@@ -181,25 +176,20 @@ std::vector<Pieces> pieces_of_spanning(const BodyParts& parts, const Clusters& c
     for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
       if (const std::int32_t number = spanning(static_cast<std::int32_t>(b));
           number >= 0 && parts[p].counted(b))
-        write_body(bodies[p], number, parts[p].bodies[b], places[p][b]);
+        append(bodies[p], row_of_body(number, places[p][b], parts[p].bodies[b]));
     for (std::size_t k = 0; k < parts[p].contacts.size(); ++k) {
       const ContactEquation& c = parts[p].contacts[k];
       const std::int32_t number = spanning(c.first);
       if (number < 0) continue;
-      const Place second = c.second < 0 ? Place{-1, -1} : places[p][at(c.second)];
-      const Place own{parts[p].subdomain, static_cast<std::int32_t>(k)};
-      write_contact(contacts[p], number, c, {own, places[p][at(c.first)], second}, parts[p].impulse[k],
-                    rolling_of(parts[p], k));
-      contacts[p].resize((contacts[p].size() + contact_width - 1) / contact_width * contact_width, 0.0);
+      Joint joint = joint_of(parts[p], k, places[p]);
+      joint.block = c.levers != nullptr;
+      if (joint.block) joint.levers = *c.levers;
+      append(contacts[p], row_of_joint(number, std::move(joint)));
     }
   });
   std::vector<Pieces> spanning(at(clusters.several));
-  const std::vector<double> all_bodies = gather_padded(parts.link(), bodies, -1);
-  for (std::size_t k = 0; k + body_width <= all_bodies.size(); k += body_width)
-    if (all_bodies[k] >= 0) read_body(std::span(all_bodies).subspan(k, body_width), spanning);
-  const std::vector<double> all_contacts = gather_padded(parts.link(), contacts, -1);
-  for (std::size_t k = 0; k + contact_width <= all_contacts.size(); k += contact_width)
-    if (all_contacts[k] >= 0) read_contact(std::span(all_contacts).subspan(k, contact_width), spanning);
+  read_rows(parts.link(), bodies, row_of_body(0, {}, {}).size(), read_body, spanning);
+  read_rows(parts.link(), contacts, row_of_joint(0, {}).size(), read_joint, spanning);
   return spanning;
 }
 
@@ -213,12 +203,7 @@ std::vector<Pieces> pieces_of_part(const BodyParts& parts, const Clusters& clust
   for (std::size_t k = 0; k < parts[p].contacts.size(); ++k) {
     const ContactEquation& c = parts[p].contacts[k];
     if (Pieces* to = own(clusters.of_contact(p, c)); to != nullptr)
-      to->joints.push_back({{parts[p].subdomain, static_cast<std::int32_t>(k)},
-                            c,
-                            places[p][at(c.first)],
-                            c.second < 0 ? Place{-1, -1} : places[p][at(c.second)],
-                            parts[p].impulse[k],
-                            rolling_of(parts[p], k)});
+      to->joints.push_back(joint_of(parts[p], k, places[p]));
   }
   for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
     if (Pieces* to = own(clusters.of_body[p][b]); to != nullptr && !to->joints.empty())

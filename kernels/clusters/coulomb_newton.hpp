@@ -23,21 +23,30 @@ struct CoulombThresholds {
   /// by which it has to make the residual smaller, in (0, 1).
   int most_iterations = 25, halvings = 5;
   double descent = 0.1;
-  /// When velocities are known though impulses still creep, as redundant contacts let them do by the hundred
-  /// steps: bodies that touch close more than so many `loops`, >= 0, and than this part `looped`, >= 0, of
-  /// their number, as chains do not; the law finds no more wrong, nor is momentum off by more, than this
-  /// part `left`, in (0, 1), of what need not be known;
-  /// and what is still to come is within the part `to_come` of it, in (0, 1). That is so many `steps` like
-  /// the last, > 1, as contacts may change; or if that is more all that would follow if they did not, as a
-  /// firmness >> 1 shows. (In a heap of 190 grains at rest 300 further steps changed at most 1.4 times as
-  /// much.) And if they did not no impulse would creep on by more than so many times, `forces` > 0, the
-  /// error that is asked for, relative to the largest; where that is at most `fine`, in (0, 1) (of a step a
-  /// fifth of balance_tolerance: CertificateThresholds::velocity_resolution). What is asked for less finely
-  /// is of velocities: beds at rest would be left without an answer.
+  /// When velocities count as known though impulses still creep, as redundant contacts let them do for
+  /// hundreds of steps. What is asked for is ErrorGoal::enough.
   struct Known {
+    /// Bodies that touch close more loops than this, >= 0, ...
     std::int32_t loops = 20;
-    double looped = 0.2, left = 0.02, to_come = 0.5;
-    double steps = 20, firmness = 1e9, forces = 2, fine = 1.1e-3;
+    /// ... and than this part of their number, >= 0, as chains do not.
+    double looped = 0.2;
+    /// The law finds no more wrong, nor is momentum off by more, than this part of what is asked for, in
+    /// (0, 1), ...
+    double left = 0.02;
+    /// ... and what is still to come is within this part of it, in (0, 1).
+    double to_come = 0.5;
+    /// To come are so many steps like the last, > 1, as contacts may change (in a heap of 190 grains at rest
+    /// 300 further steps changed at most 1.4 times as much), ...
+    double steps = 20;
+    /// ... or, if that is more, all that would follow if none changed, as a step of this firmness, >> 1,
+    /// shows.
+    double firmness = 1e9;
+    /// By such a step no impulse changes by more than so many times what is asked for, > 0, over the largest,
+    double forces = 2;
+    /// where at most this is asked for, in (0, 1): a fifth (CertificateThresholds::velocity_resolution) of a
+    /// balance_tolerance of 5e-3, and a tenth for rounding. Coarser tolerances speak of velocities: beds at
+    /// rest would be left without an answer.
+    double fine = 1.1e-3;
   };
   Known known = {};
 };

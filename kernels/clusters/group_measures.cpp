@@ -21,34 +21,37 @@ Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
                            done = added(velocities_of(problem, problem.impulse), -1, free);
   for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
     const BodyUnknown& body = problem.bodies[b];
-    row[mass] += body.mass;
-    row[incoming] += kinetic2(body, free[b].u, free[b].w);
-    row[gained] += body.mass * done[b].u.norm() + body.spin_mass * done[b].w.norm();
+    row[MeasureColumn::mass] += body.mass;
+    row[MeasureColumn::incoming] += kinetic2(body, free[b].u, free[b].w);
+    row[MeasureColumn::gained] += body.mass * done[b].u.norm() + body.spin_mass * done[b].w.norm();
     if (body.wall || body.cell) continue;
-    row[grains] += body.mass;
-    row[energy] += 0.5 * body.mass * done[b].u.squaredNorm();
+    row[MeasureColumn::grains] += body.mass;
+    row[MeasureColumn::energy] += 0.5 * body.mass * done[b].u.squaredNorm();
   }
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
     const Vec3& r = problem.impulse[k];
-    row[fastest] = larger(row[fastest], c.offset.norm());
-    row[largest] = larger(row[largest], r.norm());
-    row[pulls] += c.pull;
+    row[MeasureColumn::fastest] = larger(row[MeasureColumn::fastest], c.offset.norm());
+    row[MeasureColumn::largest] = larger(row[MeasureColumn::largest], r.norm());
+    row[MeasureColumn::pulls] += c.pull;
     const double felt = std::abs(c.normal.dot(r) - c.pull);
-    if (c.wall >= 0) row[pressed] += felt;
-    row[pressed] += face_shares(problem, c, faces).norm() * felt;
-    if (r != Vec3::Zero()) row[drive] = larger(row[drive], c.drive);
+    if (c.wall >= 0) row[MeasureColumn::pressed] += felt;
+    row[MeasureColumn::pressed] += face_shares(problem, c, faces).norm() * felt;
+    if (r != Vec3::Zero()) row[MeasureColumn::drive] = larger(row[MeasureColumn::drive], c.drive);
   }
   return row;
 }
 
 double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
   // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
-  const double sound = most_momentum(row[mass], row[incoming]) + row[mass] * row[fastest];
-  return std::max({std::min(row[gained], sound),
-                   row[drive] > 0 ? row[mass] * row[drive] : thresholds.pressed * row[pressed],
-                   thresholds.held * row[pulls],
-                   thresholds.rounding * most_momentum(row[mass], row[incoming])});
+  const double sound = most_momentum(row[MeasureColumn::mass], row[MeasureColumn::incoming]) +
+                       row[MeasureColumn::mass] * row[MeasureColumn::fastest];
+  return std::max(
+      {std::min(row[MeasureColumn::gained], sound),
+       row[MeasureColumn::drive] > 0 ? row[MeasureColumn::mass] * row[MeasureColumn::drive]
+                                     : thresholds.pressed * row[MeasureColumn::pressed],
+       thresholds.held * row[MeasureColumn::pulls],
+       thresholds.rounding * most_momentum(row[MeasureColumn::mass], row[MeasureColumn::incoming])});
 }
 
 }  // namespace talus

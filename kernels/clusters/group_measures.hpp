@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "kernels/clusters/step_error.hpp"
+#include "kernels/clusters/step_error_goal.hpp"
 
 namespace talus {
 
@@ -15,23 +15,26 @@ inline double most_momentum(double mass, double energy) {
 }
 
 /// What a cluster, or all of them, is measured by.
-enum Measure {
-  mass,
-  incoming,
-  gained,
-  pressed,
-  grains,
-  energy,
-  pulls,
-  sums,
-  drive = sums,
-  fastest,
-  largest,
-  measures
+struct MeasureColumn {
+  enum : std::size_t {
+    mass,      ///< [kg]
+    incoming,  ///< twice the kinetic energy without contacts [J]
+    gained,    ///< momentum that the contacts give [N s]
+    pressed,   ///< impulses at walls and faces [N s]
+    grains,    ///< mass of those that are grains [kg]
+    energy,    ///< kinetic, of what grains gain [J]
+    pulls,     ///< impulses that cohesion bears [N s]
+    sums,
+    drive = sums,  ///< fastest that a wall or flow drives a contact that carries [m/s]
+    fastest,       ///< largest velocity that a gap or restitution asks for [m/s]
+    largest,       ///< largest impulse of a contact [N s]
+    width
+  };
 };
 
-using Measures = std::array<double, measures>;
-constexpr RowColumns columns_of_measures{.sums = sums, .largest = measures - sums};
+using Measures = std::array<double, MeasureColumn::width>;
+constexpr RowColumns columns_of_measures{.sums = MeasureColumn::sums,
+                                         .largest = MeasureColumn::width - MeasureColumn::sums};
 
 /// The parts of a contact's impulse that the faces across x, y and z of a cell feel: b over the edges, b from
 /// one body to the other; of blocks whose flow is given, as between the spheres that hold them.

@@ -33,8 +33,8 @@ class Answers {
     std::vector<Measures> rows(clusters_.size());
     each([&](std::size_t c) { rows[c] = measures_of(clusters_[c].problem, goal.faces); });
     const Measures all = total(rows);
-    exchanged_ = {all[energy], all[grains]};
-    const Everywhere everywhere{scale_of(all, thresholds_), all[mass]};
+    exchanged_ = {all[MeasureColumn::energy], all[MeasureColumn::grains]};
+    const Everywhere everywhere{scale_of(all, thresholds_), all[MeasureColumn::mass]};
     each([&](std::size_t c) {
       groups_[c] = answered_groups(clusters_[c].problem, everywhere, goal, thresholds_);
     });

@@ -58,8 +58,8 @@ void detail::ShiftedMatrix::solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x
     x.segment<3>(static_cast<Eigen::Index>(3 * a)) = work_.segment<3>(3 * place_[a]);
 }
 
-AdmmOnTheWay::AdmmOnTheWay(const detail::FactorisedForm& form, const AdmmSettings& settings,
-                           std::span<const double> r)
+AdmmIteration::AdmmIteration(const detail::FactorisedForm& form, const AdmmSettings& settings,
+                             std::span<const double> r)
     : form_(form),
       settings_(settings),
       matrix_(form.scaled.problem, form.order),
@@ -74,7 +74,7 @@ AdmmOnTheWay::AdmmOnTheWay(const detail::FactorisedForm& form, const AdmmSetting
   begin_from(r);
 }
 
-void AdmmOnTheWay::begin_from(std::span<const double> r) {
+void AdmmIteration::begin_from(std::span<const double> r) {
   const DelassusProblem& p = form_.scaled.problem;
   for (std::size_t k = 0; k < r.size(); ++k)
     z_[static_cast<Eigen::Index>(k)] = r[k] * form_.scaled.root[k / 3];
@@ -85,13 +85,13 @@ void AdmmOnTheWay::begin_from(std::span<const double> r) {
   }
 }
 
-void AdmmOnTheWay::factorise(BestAnswer& answer) {
+void AdmmIteration::factorise(BestAnswer& answer) {
   regular_ = matrix_.factorise(rho_);
   ++answer.report().factorisations;
   progress_.spend(form_.factorisation_cost());
 }
 
-void AdmmOnTheWay::iterate(BestAnswer& answer) {
+void AdmmIteration::iterate(BestAnswer& answer) {
   if (iterations_ == 0) factorise(answer);
   if (!regular_) return;
   const DelassusProblem& p = form_.scaled.problem;
@@ -123,7 +123,7 @@ void AdmmOnTheWay::iterate(BestAnswer& answer) {
   if (iterations_ >= next_change_) balance(answer);
 }
 
-void AdmmOnTheWay::balance(BestAnswer& answer) {
+void AdmmIteration::balance(BestAnswer& answer) {
   next_change_ = 2 * iterations_;
   const double primal = (x_ - z_).norm(), dual = rho_ * (z_ - old_).norm();
   const double ratio = dual > 0 ? primal / dual : 1;
@@ -138,7 +138,7 @@ DelassusReport solve_admm(const DelassusProblem& problem, const DelassusGoal& go
   BestAnswer answer(problem, goal, r);
   if (answer.over() || problem.contacts() == 0) return answer.hand_back();
   const detail::FactorisedForm form(problem);
-  AdmmOnTheWay admm(form, settings, r);
+  AdmmIteration admm(form, settings, r);
   while (!answer.over() && admm.regular()) admm.iterate(answer);
   answer.report().work = detail::analysis_cost(problem) + admm.progress().work();
   return answer.hand_back();

@@ -50,10 +50,10 @@ class ShiftedMatrix {
 }  // namespace detail
 
 /// ADMM on the way, to be paused between any two iterations.
-class AdmmOnTheWay {
+class AdmmIteration {
  public:
   /// `form` must outlive this. `r` is the start.
-  AdmmOnTheWay(const detail::FactorisedForm& form, const AdmmSettings& settings, std::span<const double> r);
+  AdmmIteration(const detail::FactorisedForm& form, const AdmmSettings& settings, std::span<const double> r);
   /// One iteration; offers what it came to when a check is due or the solve ends.
   void iterate(BestAnswer& answer);
   /// Goes on from r with the multipliers that its velocities give.

@@ -61,7 +61,7 @@ class Portfolio {
     solver.progress().begin(answer_.least());
   }
   void begin(Method method) {
-    using Start = SweepsOnTheWay::Start;
+    using Start = SweepIteration::Start;
     const std::span<const double> r = answer_.best();
     switch (method) {
       case momentum:
@@ -170,9 +170,9 @@ class Portfolio {
   double analysis_ = 0;  ///< work that form_ took
   bool lawful_ = true;
   std::optional<detail::FactorisedForm> form_;
-  std::optional<SweepsOnTheWay> momentum_, conjugate_;
-  std::optional<NewtonOnTheWay> newton_;
-  std::optional<AdmmOnTheWay> admm_;
+  std::optional<SweepIteration> momentum_, conjugate_;
+  std::optional<NewtonIteration> newton_;
+  std::optional<AdmmIteration> admm_;
   std::array<Runner, 4> runner_;
 };
 

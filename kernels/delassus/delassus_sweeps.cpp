@@ -57,7 +57,7 @@ std::int64_t ProximalSweep::operator()(std::span<const double> centre, std::span
   return failed;
 }
 
-SweepsOnTheWay::SweepsOnTheWay(const DelassusProblem& problem, Start start, const SweepSettings& settings,
+SweepIteration::SweepIteration(const DelassusProblem& problem, Start start, const SweepSettings& settings,
                                std::span<const double> r)
     : problem_(problem),
       kind_(start),
@@ -69,7 +69,7 @@ SweepsOnTheWay::SweepsOnTheWay(const DelassusProblem& problem, Start start, cons
   begin_from(r);
 }
 
-void SweepsOnTheWay::begin_from(std::span<const double> r) {
+void SweepIteration::begin_from(std::span<const double> r) {
   start_.assign(r.begin(), r.end());
   t_ = 1;
   last_step_ = std::numeric_limits<double>::infinity();
@@ -79,7 +79,7 @@ void SweepsOnTheWay::begin_from(std::span<const double> r) {
     previous_.assign(r.size(), 0.0);
 }
 
-void SweepsOnTheWay::iterate(BestAnswer& answer) {
+void SweepIteration::iterate(BestAnswer& answer) {
   std::copy(start_.begin(), start_.end(), r_.begin());
   // The first sweep is not damped: contacts that do not touch each other are then solved at once.
   if (++sweeps_ == 2 && settings_.damping > 0)
@@ -101,14 +101,14 @@ void SweepsOnTheWay::iterate(BestAnswer& answer) {
     advance();
 }
 
-void SweepsOnTheWay::rescue(BestAnswer& answer) {
+void SweepIteration::rescue(BestAnswer& answer) {
   constexpr double limits[] = {1, 0.9, 0};
   limit_ = std::min(settings_.momentum, limits[++answer.report().rescues % 3]);
   rescued_ = sweeps_;
   begin_from(answer.best());
 }
 
-void SweepsOnTheWay::advance() {
+void SweepIteration::advance() {
   double turned_back = 0, step = 0;
   for (std::size_t c = 0; c < weight_.size(); ++c) {
     for (std::size_t k = 3 * c; k < 3 * c + 3; ++k) {
@@ -131,7 +131,7 @@ void SweepsOnTheWay::advance() {
   }
 }
 
-void SweepsOnTheWay::advance_conjugate() {
+void SweepIteration::advance_conjugate() {
   std::vector<double>& direction = previous_;
   double squared = 0;
   for (std::size_t k = 0; k < r_.size(); ++k)
@@ -150,7 +150,7 @@ void SweepsOnTheWay::advance_conjugate() {
 DelassusReport solve_nlgs(const DelassusProblem& problem, const DelassusGoal& goal,
                           const SweepSettings& settings, std::span<double> r) {
   BestAnswer answer(problem, goal, r);
-  SweepsOnTheWay sweeps(problem, SweepsOnTheWay::Start::momentum, settings, r);
+  SweepIteration sweeps(problem, SweepIteration::Start::momentum, settings, r);
   while (!answer.over()) sweeps.iterate(answer);
   answer.report().work = sweeps.progress().work();
   return answer.hand_back();
@@ -159,7 +159,7 @@ DelassusReport solve_nlgs(const DelassusProblem& problem, const DelassusGoal& go
 DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& goal, double damping,
                           std::span<double> r) {
   BestAnswer answer(problem, goal, r);
-  SweepsOnTheWay sweeps(problem, SweepsOnTheWay::Start::conjugate, {.damping = damping}, r);
+  SweepIteration sweeps(problem, SweepIteration::Start::conjugate, {.damping = damping}, r);
   while (!answer.over()) sweeps.iterate(answer);
   answer.report().work = sweeps.progress().work();
   return answer.hand_back();

@@ -56,12 +56,12 @@ DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& go
                           std::span<double> r);
 
 /// The sweeps of one solve, to be paused between any two: what `automatic` does with several methods in turn.
-class SweepsOnTheWay {
+class SweepIteration {
  public:
   /// How the next sweep begins.
   enum class Start { momentum, conjugate };
   /// The problem must outlive this. `r` is the start.
-  SweepsOnTheWay(const DelassusProblem& problem, Start start, const SweepSettings& settings,
+  SweepIteration(const DelassusProblem& problem, Start start, const SweepSettings& settings,
                  std::span<const double> r);
   /// One sweep; offers what it came to when a check is due or the solve ends.
   void iterate(BestAnswer& answer);

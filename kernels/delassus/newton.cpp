@@ -196,7 +196,7 @@ double next_proximal(double alpha, int inner, bool lost) {
 
 }  // namespace
 
-struct NewtonOnTheWay::State {
+struct NewtonIteration::State {
   State(const detail::FactorisedForm& of, const NewtonSettings& how)
       : form(of),
         settings(how),
@@ -238,28 +238,28 @@ struct NewtonOnTheWay::State {
   detail::OwnError progress;
 };
 
-NewtonOnTheWay::NewtonOnTheWay(const detail::FactorisedForm& form, const NewtonSettings& settings,
-                               std::span<const double> r)
+NewtonIteration::NewtonIteration(const detail::FactorisedForm& form, const NewtonSettings& settings,
+                                 std::span<const double> r)
     : state_(std::make_unique<State>(form, settings)) {
   begin_from(r);
 }
-NewtonOnTheWay::~NewtonOnTheWay() = default;
+NewtonIteration::~NewtonIteration() = default;
 
-const detail::OwnError& NewtonOnTheWay::progress() const {
+const detail::OwnError& NewtonIteration::progress() const {
   return state_->progress;
 }
-detail::OwnError& NewtonOnTheWay::progress() {
+detail::OwnError& NewtonIteration::progress() {
   return state_->progress;
 }
 
-void NewtonOnTheWay::begin_from(std::span<const double> r) {
+void NewtonIteration::begin_from(std::span<const double> r) {
   for (std::size_t k = 0; k < r.size(); ++k)
     state_->x[static_cast<Eigen::Index>(k)] = r[k] * state_->form.scaled.root[k / 3];
   state_->inner = -1;
   state_->alpha = state_->settings.proximal;
 }
 
-void NewtonOnTheWay::iterate(BestAnswer& answer) {
+void NewtonIteration::iterate(BestAnswer& answer) {
   State& s = *state_;
   constexpr int most_inner = 30;
   if (s.inner < 0) s.begin_outer();
@@ -298,7 +298,7 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
   if (answer.over() || problem.contacts() == 0) return answer.hand_back();
   if (!lawful(problem, answer.report().failed_contacts)) return answer.hand_back();
   const detail::FactorisedForm form(problem);
-  NewtonOnTheWay newton(form, settings, r);
+  NewtonIteration newton(form, settings, r);
   while (!answer.over()) newton.iterate(answer);
   answer.report().work = detail::analysis_cost(problem) + newton.progress().work();
   return answer.hand_back();

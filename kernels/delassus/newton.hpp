@@ -36,12 +36,12 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
 bool lawful(const DelassusProblem& problem, std::int64_t& failed_contacts);
 
 /// Newton's method on the way, to be paused between any two steps.
-class NewtonOnTheWay {
+class NewtonIteration {
  public:
   /// `form` must outlive this. `r` is the start.
-  NewtonOnTheWay(const detail::FactorisedForm& form, const NewtonSettings& settings,
-                 std::span<const double> r);
-  ~NewtonOnTheWay();
+  NewtonIteration(const detail::FactorisedForm& form, const NewtonSettings& settings,
+                  std::span<const double> r);
+  ~NewtonIteration();
   /// One step; offers what it came to.
   void iterate(BestAnswer& answer);
   /// Goes on from r, with the first proximal weight.

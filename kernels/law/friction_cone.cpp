@@ -21,7 +21,7 @@ constexpr double accepted = 1e-9;
 
 /// Impulses above this, in units of |q| / W_NN, are an escape along a direction that W does not see, not a
 /// solution.
-constexpr double largest_impulse = 1e12;
+constexpr double escape_limit = 1e12;
 
 /// The sliding equation in units of W_NN and of the largest |q|: r_T(alpha) = (n0 + alpha n1) / det(alpha)
 /// with det = alpha^2 + trace alpha + d, and excess(alpha) = |r_T| - mu r_N, times det / max(1, mu).
@@ -92,15 +92,14 @@ Vec3 sliding_impulse(const SlidingEquation& e, double alpha, double mu) {
 /// By how much an impulse inside the cone misses u = 0, relative to q. Not the natural map: with a large mu
 /// that multiplies the rounding of u_T.
 double stick_residual(const Mat3& W, const Vec3& q, const Vec3& r) {
-  if (!(r[0] >= 0) || !(r.norm() < largest_impulse)) return std::numeric_limits<double>::infinity();
+  if (!(r[0] >= 0) || !(r.norm() < escape_limit)) return std::numeric_limits<double>::infinity();
   return (W * r + q).norm() / (q.norm() + 8 * epsilon / accepted * (W.cwiseAbs() * r.cwiseAbs()).norm());
 }
 
 /// By how much an impulse on the cone misses u_N = 0 and u_T opposed to r_T.
 double slide_residual(const Mat3& W, const Vec3& q, const Vec3& r) {
   const double rt = r.tail<2>().norm();
-  if (!(r[0] >= 0) || !(r.norm() < largest_impulse) || !(rt > 0))
-    return std::numeric_limits<double>::infinity();
+  if (!(r[0] >= 0) || !(r.norm() < escape_limit) || !(rt > 0)) return std::numeric_limits<double>::infinity();
   Vec3 miss = W * r + q;
   miss.tail<2>() += r.tail<2>() * (miss.tail<2>().norm() / rt);
   return miss.norm() / (q.norm() + 8 * epsilon / accepted * (W.cwiseAbs() * r.cwiseAbs()).norm());

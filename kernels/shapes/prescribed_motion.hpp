@@ -102,8 +102,9 @@ RigidVelocity mean_velocity(std::span<const MotionPart> parts, double time, doub
 RigidVelocity mean_surface_velocity(std::span<const MotionPart> parts, double time, double h,
                                     const Vec3& pivot);
 
-/// Bound on the acceleration of oscillations [m/s^2], and the shortest of their periods [s] or infinity.
+/// Bound on the acceleration of oscillations [m/s^2].
 double largest_acceleration(std::span<const MotionPart> parts);
+/// The shortest period of an oscillation, or whole turn of a wall that turns [s]; infinity where none does.
 double shortest_period(std::span<const MotionPart> parts);
 
 }  // namespace talus

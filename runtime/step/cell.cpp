@@ -48,7 +48,10 @@ void validate_stress(const Setup& setup, const Stage& stage) {
   const bool swings = std::ranges::any_of(load.amplitude, [](double a) { return a != 0; });
   if (!load.any() && !swings) return;
   const auto refuse = [&](const std::string& what) {
-    throw std::invalid_argument(fmt::format("stage '{}', stress: {}", stage.name, what));
+    throw std::invalid_argument(fmt::format("stage '{}': stress: {}", stage.name, what));
+  };
+  const auto refuse_key = [&](const std::string& key, const std::string& what) {
+    throw std::invalid_argument(fmt::format("stage '{}': stress.{}: {}", stage.name, key, what));
   };
   constexpr const char* names[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
   constexpr std::array<Eigen::Index, 2> axes[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
@@ -72,11 +75,12 @@ void validate_stress(const Setup& setup, const Stage& stage) {
           "give all of cell.lengths",
           "xyz"[setup.domain.edges()[first] == 0 ? first : second], names[k]));
     if (load.to[k] && rates[k] != 0)
-      refuse(fmt::format("{} has a rate, too; a component follows either a rate or a stress", names[k]));
+      refuse_key(names[k], "has a rate, too; a component follows either a rate or a stress");
     if ((load.to[k] && !std::isfinite(*load.to[k])) || !std::isfinite(load.amplitude[k]))
-      refuse(fmt::format("{} must be finite [Pa]", names[k]));
+      refuse_key(names[k], "must be finite [Pa]");
     if (!load.to[k] && load.amplitude[k] != 0)
-      refuse(fmt::format("amplitude_{0} swings about {0}, which is not given", names[k]));
+      refuse_key(fmt::format("amplitude_{}", names[k]),
+                 fmt::format("swings about {}, which is not given", names[k]));
   }
   if (swings && !(load.period > 0)) refuse("swings need a period > 0 [s]");
   const bool chosen = stage.chooses_time_step;
@@ -85,11 +89,13 @@ void validate_stress(const Setup& setup, const Stage& stage) {
                step = chosen ? longest : stage.time_step;
   constexpr double steps = 4;  // in which a swing still has its amplitude
   if (swings && load.period < steps * step)
-    refuse(fmt::format(
-        "swings of a period of {} s are not seen in steps of up to {} s; make {} a quarter of the "
-        "period at most",
-        load.period, step, chosen ? "time_step_max" : "time_step"));
-  if (!(load.ramp_time >= 0 && std::isfinite(load.ramp_time))) refuse("ramp_time must be a number >= 0 [s]");
+    refuse_key(
+        "period",
+        fmt::format("swings of a period of {} s are not seen in steps of up to {} s; make {} a quarter "
+                    "of the period at most",
+                    load.period, step, chosen ? "time_step_max" : "time_step"));
+  if (!(load.ramp_time >= 0 && std::isfinite(load.ramp_time)))
+    refuse_key("ramp_time", "must be a number >= 0 [s]");
 }
 
 /// "" or what is wrong with the size of a part of space, where all images in it count.

@@ -253,8 +253,12 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   // not.
   const bool apart = !twice_ && !knows_more(parameters_);
   small_seconds_ += graph::seconds_now() - began;
-  return {error.relative(), error.solved, error.mends,
-          error.jammed,     error.locked, apart ? error.exchanged : Exchanged{}};
+  return {.relative = error.relative(),
+          .solved = error.solved,
+          .mends = error.mends,
+          .jammed = error.jammed,
+          .locked = error.locked,
+          .exchanged = apart ? error.exchanged : Exchanged{}};
 }
 
 double GlobalSolver::take_small_seconds() {

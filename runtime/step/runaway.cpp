@@ -63,6 +63,16 @@ void check_strain(const StepState& state, double time_step, double most, const S
       step.text(), strain, most));
 }
 
+/// Rates that are given close a cell whatever its grains bear.
+void check_room(const StepOutcome& outcome) {
+  const double room = outcome.state.domain.edges().prod();  // 0 where an axis does not repeat
+  if (room == 0 || outcome.sample.volume <= room) return;
+  throw NoSpaceError(fmt::format(
+      "{}: the cell has {:.3g} m^3 left, less than its grains, {:.3g} m^3. End the stage sooner, or let the "
+      "cell follow a stress",
+      outcome.step.text(), room, outcome.sample.volume));
+}
+
 /// Energy of grains at the speed that attractions give one of mean size at a wall in a step [J]. It is no
 /// load, but contacts that pull and push leave a part of it, by the tolerance.
 double cohesive_energy(const StepOutcome& outcome) {
@@ -92,6 +102,7 @@ void check_for_runaway(const StepOutcome& outcome, double energy_free, const Run
                     step.text(), describe(state.bodies, motion.fastest)));
   check_walls_apart(state.walls, thresholds.facing, step);
   check_strain(state, parameters.time_step, thresholds.most_strain, step);
+  check_room(outcome);
   double fastest_wall2 = 0;
   for (std::size_t w = 0; w < state.walls.size(); ++w) {
     const double speed = state.wall_states[w].material_speed;

@@ -1,6 +1,7 @@
 #include "io/scene/detail/grain_read.hpp"
 
 #include <algorithm>
+#include <functional>
 
 #include "io/scene/detail/material_read.hpp"
 #include "io/scene/detail/sample_read.hpp"
@@ -33,6 +34,11 @@ void check_amount(const toml::table& table, const std::string& path, const Inser
   if (rule.track && rule.count.value_or(few + 1) > few)
     fail_at(*table.get("track"), path + ".track",
             fmt::format("writes every grain in every step: give a count of {} at most", few));
+  if (const double least = sphere_mass(smallest_radius(rule.radii), rule.density);
+      rule.mass && *rule.mass < least)
+    fail_at(*table.get("mass"), path + ".mass",
+            fmt::format("{:g} kg is less than the smallest grain has, {:g} kg: none would come", *rule.mass,
+                        least));
   for (const double radius : {smallest_radius(rule.radii), largest_radius(rule.radii)})
     if (const double mass = sphere_mass(radius, rule.density); !mass_is_sound(mass))
       fail_at(
@@ -64,7 +70,10 @@ void read_remove(const toml::table& table, const std::string& path, Scene& scene
   settle_name(table, path, "remove", scene.setup.removes, rule);
   if (table.get("material")) rule.material = read_material(table, path, scene, material_of_grains);
   rule.region = needed_region(table, path, {Region::Kind::box, Region::Kind::cylinder, Region::Kind::beyond});
-  if (!std::ranges::is_sorted(rule.at)) fail_at(*table.get("at"), path + ".at", "times must ascend");
+  if (std::ranges::adjacent_find(rule.at, std::greater_equal()) != rule.at.end())
+    fail_at(*table.get("at"), path + ".at", "times must ascend");
+  if (!rule.at.empty() && rule.times.interval > 0)
+    fail_at(*table.get("interval"), path + ".interval", "has no meaning with `at`, which has all times");
   check_times(table, path, rule.times, scene);
   scene.setup.removes.push_back(std::move(rule));
 }

@@ -100,6 +100,8 @@ void check_parts(const toml::table& table, const std::string& path, const Scene&
     const MotionPart& part = parts[k];
     const std::string here = fmt::format("{}.motion[{}]", path, k++);
     const StageRange stages = stages_at(*entry, here, scene);
+    const bool turns = part.kind == MotionPart::Kind::rotation;
+    const char* key = turns ? "rate" : "frequency";
     const std::optional<double> time = time_of(scene, stages);
     if (part.table && time && part.table->end() < *time * (1 - 1e-9))
       fail_at(
@@ -112,10 +114,10 @@ void check_parts(const toml::table& table, const std::string& path, const Scene&
       const double period = shortest_period({&part, 1});
       constexpr double steps_of_period = 8;
       if (stage.time_step * steps_of_period > period)
-        fail_at(*entry->get("frequency"), here + ".frequency",
-                fmt::format("a period of {:g} s has less than {} steps of {:g} s in stage '{}'. Reduce its "
+        fail_at(*entry->get(key), here + "." + key,
+                fmt::format("a {} of {:g} s has less than {} steps of {:g} s in stage '{}'. Reduce its "
                             "time_step, or let it be \"auto\"",
-                            period, steps_of_period, stage.time_step, stage.name));
+                            turns ? "turn" : "period", period, steps_of_period, stage.time_step, stage.name));
     }
   }
 }

@@ -27,7 +27,8 @@ std::string found_text(const toml::node& node) {
   if (const auto* whole = node.as_integer()) return fmt::format("the integer {}", whole->get());
   if (const auto* real = node.as_floating_point()) return "the real " + toml_text(real->get());
   if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";
-  if (const auto* list = node.as_array()) return fmt::format("a list of {}", list->size());
+  if (const auto* list = node.as_array())
+    return list->empty() ? "an empty list" : fmt::format("a list of {}", list->size());
   return node.is_table() ? "a table" : "a date or time";
 }
 

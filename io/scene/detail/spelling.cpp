@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 namespace talus::io::detail {
 
@@ -26,9 +27,12 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 std::string nearest(const std::string& word, const std::vector<std::string>& known) {
   const std::size_t limit = word.size() <= 3 ? 1 : std::max<std::size_t>(2, word.size() / 3);
   std::string best;
-  std::size_t least = limit + 1;
+  // Of words as near, one of the same letters is meant: "xz" by "zx", not "xx".
+  std::pair<std::size_t, bool> least{limit + 1, false};
   for (const std::string& candidate : known)
-    if (const std::size_t distance = edit_distance(word, candidate); distance < least) {
+    if (const std::pair<std::size_t, bool> distance{edit_distance(word, candidate),
+                                                    !std::ranges::is_permutation(word, candidate)};
+        distance < least) {
       least = distance;
       best = candidate;
     }

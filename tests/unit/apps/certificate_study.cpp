@@ -21,7 +21,9 @@
 #include "apps/study_certificate/scene_maker.hpp"
 #include "apps/study_certificate/step_problem.hpp"
 #include "apps/study_certificate/study_certificate.hpp"
+#include "apps/study_certificate/true_errors.hpp"
 #include "io/files/output_directory.hpp"
+#include "kernels/clusters/step_error_goal.hpp"
 #include "kernels/samples/sample.hpp"
 #include "tests/unit/apps/audited_scenes.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
@@ -300,6 +302,17 @@ TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack
   again.out = (scratch / "again").string();
   EXPECT_NE(study_certificate_command(again), exit_bad_input);
   EXPECT_EQ(study_certificate_command(again), exit_bad_input);  // there is a study already
+}
+
+// The judge shares no code with what it judges. What an error is relative to is the same number twice,
+// written down in docs/certificate.md: where they differ one of them speaks of another error.
+TEST(CertificateStudy, JudgesTheErrorThatIsClaimed) {
+  const ErrorUnits judged;
+  const StepErrorThresholds claimed;
+  EXPECT_EQ(judged.walls, claimed.pressed);
+  EXPECT_EQ(judged.elsewhere, claimed.elsewhere);
+  EXPECT_EQ(judged.held, claimed.held);
+  EXPECT_EQ(judged.lopsided, claimed.lopsided);
 }
 
 }  // namespace

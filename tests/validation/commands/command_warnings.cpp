@@ -38,6 +38,19 @@ TEST_F(Warnings, AreNoneWhereNothingIsOdd) {
   EXPECT_EQ(of(cell_scene), "");
 }
 
+TEST_F(Warnings, OfWhatIsToHappenWhenTheRunHasEnded) {
+  const std::string region = "region = { shape = \"box\", low = [0, 0, 0], high = [1, 1, 1] }\n",
+                    end = " is never reached: the run ends by";
+  EXPECT_NE(of(column_scene + "[[remove]]\nname = \"r\"\nat = [1e-3, 900]\n" + region)
+                .find("remove 'r': at = 900 s" + end),
+            std::string::npos);
+  EXPECT_NE(of(column_scene + "[[probe]]\nname = \"p\"\nevery = 900\n" + region)
+                .find("probe 'p': every = 900 s" + end),
+            std::string::npos);
+  EXPECT_EQ(of(column_scene + "[[remove]]\nat = [1e-3]\n" + region + "[[probe]]\nevery = 1e-3\n" + region),
+            "");
+}
+
 TEST_F(Warnings, OfASceneWithoutWalls) {
   const std::size_t begin = column_scene.find("[[wall]]"), end = column_scene.find("[[stage]]");
   EXPECT_NE(of(std::string(column_scene).erase(begin, end - begin)).find("no walls"), std::string::npos);

@@ -91,7 +91,11 @@ TEST(GrainRules, MistakesAreNamedWithARemedy) {
   expect(replaced(insert, "region = {", "regions = {"), "unknown key");
   expect("[[insert]]\ncount = 1\nradius = 1\n", "insert[0].region: missing");
   expect(insert + insert, "another insert is named 'rain'");
-  expect(insert + replaced(remove, "[0.5, 1]", "[1, 0.5]"), "times must ascend");
+  for (const std::string times : {"[1, 0.5]", "[1, 1]"})
+    expect(insert + replaced(remove, "[0.5, 1]", times), "times must ascend");
+  expect(insert + replaced(remove, "[0.5, 1]", "[0.5, 1]\ninterval = 0.1"), "no meaning with `at`");
+  expect(insert + replaced(remove, "[0.5, 1]", "[\"half\"]"), "remove[0].at");
+  expect(replaced(insert, "count = 50", "mass = 1e-12"), "less than the smallest grain has");
   expect(insert + replaced(remove, "\"beyond\", point = [0, 0, -1], normal = [0, 0, -1]",
                            "\"disc\", centre = [0, 0, 0], radius = 1"),
          "'disc' cannot be used here");

@@ -121,6 +121,11 @@ TEST_F(WallMotions, ThatMakeNoSenseAreRefused) {
   expect_refused(scene_of(disc, motion + "kind = \"oscillation\"\ndirection = [1, 0, 0]\namplitude = 1e-3\n"
                                          "frequency = 300\n"),
                  "wall[0].motion[0].frequency", "less than 8 steps of 0.001 s in stage 'first'");
+  // A whole turn in each step is seen as none.
+  const std::string whirl =
+      motion + "kind = \"rotation\"\naxis = [0, 0, 1]\npoint = [0, 0, 0]\nrate = 6283.185307\n";
+  expect_refused(scene_of(disc, whirl), "wall[0].motion[0].rate", "a turn of 0.001 s has less than 8 steps");
+  EXPECT_NO_THROW(parse_scene(scene_of(disc, whirl + "surface_only = true\n"), "motion.toml"));
   expect_refused(scene_of("side = \"z-\"\n", motion + turning) +
                      "[[stage.load]]\nwall = \"w\"\ndrive = \"velocity\"\nvelocity = [0, 0, 1]\n",
                  "stage[1].load[0].wall", "has a motion, and that alone moves it");

@@ -1,8 +1,12 @@
 #include "kernels/law/pair_table.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <set>
+#include <string>
+
+#include "kernels/law/attraction.hpp"
 
 namespace talus::pair_table_test {
 namespace {
@@ -32,6 +36,13 @@ TEST(PairTable, OfOneMaterialTellsGrainsFromWalls) {
   EXPECT_EQ(table.between(material_of_walls, material_of_grains), (PairLaw{0.2, 0.7}));
   EXPECT_EQ(table.largest(&PairLaw::friction), 0.5);
   EXPECT_EQ(laws_of_one_material(0.1, 0.2, 0).largest(&PairLaw::friction), 0.2) << "not the first of them";
+}
+
+TEST(PairTable, TheReferencePageSaysHowFarCohesionReaches) {
+  const std::string said = cohesion_attraction.sentence;
+  EXPECT_NE(said.find(fmt::format("a gap of {:g} of the smaller radius", CohesionRule{}.reach)),
+            std::string::npos)
+      << said;
 }
 
 }  // namespace

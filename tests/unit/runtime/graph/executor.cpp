@@ -102,8 +102,16 @@ TEST(Executor, GivesTheBitsOfTheProgramInOrderForAnyThreadsAndAnyDelays) {
   }
 }
 
-TEST(Executor, RunsAnEmptyGraph) {
-  for (const int threads : thread_counts) Executor({.threads = threads}).run(Graph());
+TEST(Executor, GoesOnBehindAnEmptyGraph) {
+  for (const int threads : thread_counts) {
+    Executor executor({.threads = threads});
+    executor.run(Graph());
+    int tasks = 0;
+    Graph graph;
+    graph.task("task", {}, [&] { ++tasks; });
+    executor.run(graph);
+    EXPECT_EQ(tasks, 1);
+  }
 }
 
 TEST(Executor, RunsEveryTaskOnceAndEveryTeamOncePerThread) {

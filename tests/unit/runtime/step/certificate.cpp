@@ -154,7 +154,7 @@ TEST(Certificate, SaysWhatASituationIs) {
   }
 }
 
-TEST(Certificate, EveryThresholdDecidesASituation) {
+TEST(Certificate, AThresholdMovedByOneMovesTheVerdict) {
   using enum Verdict;
   struct Case {
     Situation situation;

@@ -146,6 +146,27 @@ TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
   }
 }
 
+// Rates that are given close a cell whatever its grains bear.
+TEST(Runaway, OfACellThatIsLessThanItsGrainsHasNoRoom) {
+  talus::Setup setup;
+  setup.domain = periodic_domain({1, 1, 1});
+  setup.stages = {stage("close", 1)};
+  Bodies one;
+  add_sphere(one, BodyId{5}, Vec3(0.5, 0.5, 0.5), 0.01, density);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, one, executor);
+  simulation.step();
+  SampleSize size;
+  const StepSums& sums = simulation.sums();
+  const StepOutcome outcome{
+      {1, "close"}, simulation.setup(),     size, simulation.parameters(), simulation.state(),
+      sums,         simulation.iterations()};
+  size.volume = 0.99;
+  EXPECT_NO_THROW(check_for_runaway(outcome, 0));
+  size.volume = 1.01;
+  EXPECT_THROW(check_for_runaway(outcome, 0), NoSpaceError);
+}
+
 /// Of three balls that touch above a floor, two fall at 1 cm/s and the third waits: behind the impact
 /// rounding of a position is all that moves them, many times the motion that is left of theirs.
 TEST(Simulation, TakesTheRoundingOfAPositionForNoRunaway) {
