@@ -97,8 +97,7 @@ complete -o filenames -F _talus talus
 std::string man_page(std::span<const Command> table) {
   std::string page = fmt::format(
       ".TH TALUS 1 \"\" \"Talus {}\" \"User Commands\"\n.SH NAME\ntalus \\- dense granular matter by "
-      "nonsmooth contact "
-      "dynamics\n.SH SYNOPSIS\n.B talus\n.I COMMAND\n[\\fIOPTIONS\\fR]\n.SH COMMANDS\n",
+      "nonsmooth contact dynamics\n.SH SYNOPSIS\n.B talus\n.I COMMAND\n[\\fIOPTIONS\\fR]\n.SH COMMANDS\n",
       troff(io::version()));
   for (const Described& each : described(table, "talus")) {
     page += fmt::format(".SS \"{}\"\n{}.\n", troff(each.path), troff(each.command->sentence));
@@ -111,10 +110,9 @@ std::string man_page(std::span<const Command> table) {
   }
   page +=
       ".SH EXIT STATUS\n.TP\n.B 0\ndone\n.TP\n.B 1\nfailed\n.TP\n.B 2\nbad input, nothing was "
-      "written\n.TP\n.B 3\n"
-      "done, but a step or problem missed its tolerance\n.TP\n.B 75\nstopped, and \\-\\-resume goes on from "
-      "there\n"
-      ".SH SEE ALSO\ndocs/tutorial.md, docs/scenes.md and docs/formats.md of the sources, "
+      "written\n.TP\n.B 3\ndone, but a step or problem missed its tolerance\n.TP\n.B 75\nstopped, and "
+      "\\-\\-resume goes on from there\n.SH SEE ALSO\ndocs/tutorial.md, docs/scenes.md and docs/formats.md "
+      "of the sources, "
       "in /usr/share/doc/talus of the package\n";
   return page;
 }

@@ -89,8 +89,7 @@ std::string version_text() {
   const io::Provenance build = io::collect_provenance();
   return fmt::format(
       "talus {}\ncommit {}{}, {} build by {}: {}\nfeatures: {}, OpenMP, HDF5 {}.{}.{}{}, METIS; sweeps here "
-      "by "
-      "{}\nlicence: Apache-2.0",
+      "by {}\nlicence: Apache-2.0",
       io::version(), build.git_hash, build.git_dirty ? " with changes" : "", build.build_type, build.compiler,
       build.flags, graph::simulated_ranks ? "simulated ranks (SimGrid)" : "MPI", H5_VERS_MAJOR, H5_VERS_MINOR,
       H5_VERS_RELEASE, parallel_hdf5 ? " (parallel)" : "",
@@ -178,8 +177,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done; 1 failed; 2 bad input, nothing was written; 3 done, but a step or problem missed "
-      "its\n"
-      "tolerance; 75 stopped (`talus run` goes on with --resume). First run: docs/tutorial.md; files it "
+      "its\ntolerance; 75 stopped (`talus run` goes on with --resume). First run: docs/tutorial.md; files it "
       "leaves: docs/formats.md");
   app.failure_message(failure_message);
 

@@ -138,8 +138,7 @@ json live_data(const Frame& frame, const io::GrainShapes& shapes,
 
 std::string live_view(const json& data) {
   return "<div class=\"live\" hidden><canvas tabindex=\"0\" aria-label=\"The sample; arrow keys turn it, + "
-         "and "
-         "- change its size\"></canvas>\n<p><label>coloured by <select></select></label> <span "
+         "and - change its size\"></canvas>\n<p><label>coloured by <select></select></label> <span "
          "class=\"bar\"></span><span class=\"scale\"></span></p>\n"
          "<script type=\"application/json\" class=\"grains\">" +
          data.dump() + "</script>\n<script>" + view_script + "</script></div>\n";

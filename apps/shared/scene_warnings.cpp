@@ -79,7 +79,7 @@ void add_endless_stages(const io::Scene& scene, std::vector<std::string>& warnin
                                      stage.name, *stage.end.time, *stage.end.time / stage.time_step));
 }
 
-/// Time by which the stages named, or all, have ended [s], infinity where that is open.
+/// Length of the stage named, or of the whole run, at most [s]; infinity where that is open.
 double latest_end(const io::Scene& scene, const std::string& only) {
   double sum = 0;
   for (const Stage& stage : scene.setup.stages) {
@@ -96,7 +96,8 @@ double latest_end(const io::Scene& scene, const std::string& only) {
 /// What is to happen when the run has ended.
 void add_late(const io::Scene& scene, std::vector<std::string>& warnings) {
   for (const RemoveRule& rule : scene.setup.removes)
-    if (const double end = latest_end(scene, rule.times.stage); !rule.at.empty() && rule.at.back() > end)
+    if (const double end = std::min(latest_end(scene, rule.times.stage), rule.times.until);
+        !rule.at.empty() && rule.at.back() > end)
       warnings.push_back(fmt::format("remove '{}': at = {:g} s is never reached: {} by {:g} s", rule.name,
                                      rule.at.back(),
                                      rule.times.stage.empty() ? "the run ends" : "its stage ends", end));

@@ -23,6 +23,7 @@ class SceneBench {
   double wall_speed = 0;                ///< [m/s] of walls that move by themselves, the largest
   double cohesion = 0;                  ///< [N] of all pairs
   double rolling = 0;                   ///< rolling resistance of all pairs; then grains have friction
+  bool jams = false;                    ///< grains and walls have friction, and no restitution
   BodyShape shape = BodyShape::sphere;  ///< of all grains
   int size;                             ///< MakerSettings::size
   int steps;

@@ -98,7 +98,8 @@ void make_wedge(SceneBench& bench) {
 void make_landing(SceneBench& bench) {
   Draws& draws = bench.draws;
   bench.speed = 0;
-  const double a = draws.between_decades(3e-3, 0.3), s = std::sin(a);
+  bench.jams = true;
+  const double a = draws.between_decades(3e-3, 0.1), s = std::sin(a);
   bench.add_wall("left", Vec3::Zero(), {std::cos(a), 0, s});
   bench.add_wall("right", Vec3::Zero(), {-std::cos(a), 0, s});
   const Vec3 down = -draws.between_decades(1, 100) * bench.speed_of_fall() * Vec3::UnitZ();

@@ -42,8 +42,7 @@ constexpr std::array families = {
                 make_touching},
     SceneFamily{"clumps", "clumps of balls that lie on one another, or meet in flight", make_clumps},
     SceneFamily{"rolling", "beams and heaps of grains that resist rolling", make_rolling},
-    SceneFamily{"boulder", "a boulder of up to 1000 radii that grains lean on or roll against",
-                make_boulder},
+    SceneFamily{"boulder", "a boulder of up to 1000 radii that grains lean on or roll against", make_boulder},
     SceneFamily{"landing", "grains that land in a narrow V, where friction jams them", make_landing}};
 
 double draw_time_step(SceneBench& bench) {
@@ -74,7 +73,7 @@ void change_loads(SceneBench& bench, Stage& stage) {
   if (pushed != setup.walls.end() && kind < 0.4) {
     WallLoad load = pushed->load;
     load.force *= draws.chance(0.5) ? 2 : 0.5;
-    stage.loads.emplace_back(pushed->name, load);
+    stage.loads.push_back({pushed->name, load});
   } else if (kind < 0.7) {
     stage.gravity *= 2;
   } else {
@@ -94,10 +93,11 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   stage.time_step = in_cell ? bench.cell_stages.front().time_step : draw_time_step(bench);
   stage.gravity = bench.gravity > 0 ? Vec3(0, 0, -bench.gravity) : Vec3(Vec3::Zero());
   if (in_cell) take_flow(bench.cell_stages.front(), stage);
-  const bool smooth = draws.chance(0.5) && bench.rolling == 0;
+  const bool smooth = draws.chance(0.5) && bench.rolling == 0 && !bench.jams;
   const double friction = smooth ? 0 : draws.between(0.1, 0.8);
-  const double at_walls = draws.chance(0.7) ? friction : 0;
-  const double restitution = draws.chance(0.6) ? 0 : draws.chance(0.2) ? 1 : draws.unit();
+  const double at_walls = draws.chance(0.7) || bench.jams ? friction : 0;
+  const double drawn = draws.chance(0.6) ? 0 : draws.chance(0.2) ? 1 : draws.unit();
+  const double restitution = bench.jams ? 0 : drawn;
   stage.laws = laws_of_one_material(friction, at_walls, restitution);
   if (bench.cohesion > 0) stage.laws.set_all(cohesion_attraction, bench.cohesion);
   if (bench.rolling > 0) stage.laws.set_all(&PairLaw::rolling_resistance, bench.rolling);

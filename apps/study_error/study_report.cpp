@@ -150,8 +150,7 @@ void add_residual_charts(const std::vector<ResidualRow>& rows, const StudyPlan& 
       table);
   add_chart(report, std::move(sweeps),
             "The same against the number of sweeps over all contacts: what is left of a difference when the "
-            "cost of "
-            "a sweep is taken out.");
+            "cost of a sweep is taken out.");
 }
 
 /// What solves of one step are compared in: where a row stands in a picture, and what is said above it.
@@ -267,8 +266,7 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
       stress.levels.push_back({scatter, "seed to seed"});
     add_chart(report, std::move(stress),
               "What a tighter tolerance or a smaller time step buys in the stress ratio of a whole run, and "
-              "what it "
-              "costs." +
+              "what it costs." +
                   of_reference);
   }
   add_chart(

@@ -80,14 +80,16 @@ class SceneReader {
     if (node && !node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
     return node ? *node->as_table() : nothing_;
   }
-  /// What the cell has no room for is told at its line, what is wrong with a stage at that.
+  /// What the cell has no room for is told at its line, what is wrong with a stage or a wall at that.
   template <class Check>
   void check_by_cell(const Check& check) const {
     try {
       check();
     } catch (const std::invalid_argument& error) {
-      const std::string table = root_.contains("cell") ? "cell" : "stage", what = error.what();
-      throw error_in(scene_, table, what.starts_with("cell: ") ? what.substr(6) : what);
+      const std::string what = error.what();
+      for (const std::string table : {"stage", "wall"})
+        if (what.starts_with(table + " '")) throw error_in(scene_, table, what);
+      throw error_in(scene_, "cell", what.starts_with("cell: ") ? what.substr(6) : what);
     }
   }
 
@@ -232,26 +234,26 @@ class SceneReader {
     const std::vector<Wall>& walls = scene_.setup.walls;
     for (const toml::table* entry : tables_at(table, "load", path + ".load")) {
       const std::string load_path = fmt::format("{}.load[{}]", path, stage.loads.size());
-      NamedLoad load;
-      read_table(*entry, load_path, keys_.stage_load, {}, load);
+      StageLoad own;
+      read_table(*entry, load_path, keys_.stage_load, {}, own);
       std::vector<std::string> names;
       for (const Wall& wall : walls) names.push_back(wall.name);
       const auto index =
-          static_cast<std::size_t>(std::find(names.begin(), names.end(), load.first) - names.begin());
+          static_cast<std::size_t>(std::find(names.begin(), names.end(), own.wall) - names.begin());
       const toml::node& named = *entry->get("wall");
       if (index == names.size())
         fail_at(named, load_path + ".wall",
-                fmt::format("no wall is named '{}'{}", load.first, hint(load.first, names)));
-      for (const NamedLoad& earlier : stage.loads)
-        if (earlier.first == load.first)
-          fail_at(named, load_path + ".wall", fmt::format("this stage loads wall '{}' twice", load.first));
+                fmt::format("no wall is named '{}'{}", own.wall, hint(own.wall, names)));
+      for (const StageLoad& earlier : stage.loads)
+        if (earlier.wall == own.wall)
+          fail_at(named, load_path + ".wall", fmt::format("this stage loads wall '{}' twice", own.wall));
       refuse_load(*entry, load_path, walls[index].shape.name);
-      if (load.second.drive != WallDrive::fixed && !walls[index].motion.empty())
+      if (own.load.drive != WallDrive::fixed && !walls[index].motion.empty())
         fail_at(named, load_path + ".wall",
-                fmt::format("wall '{}' has a motion, and that alone moves it", load.first));
-      if (load.second.drive == WallDrive::pressure) require_face(walls, index, *entry, load_path);
-      in_force[index] = load.second;
-      stage.loads.push_back(std::move(load));
+                fmt::format("wall '{}' has a motion, and that alone moves it", own.wall));
+      if (own.load.drive == WallDrive::pressure) require_face(walls, index, *entry, load_path);
+      in_force[index] = own.load;
+      stage.loads.push_back(std::move(own));
     }
   }
 
@@ -274,7 +276,7 @@ class SceneReader {
     const std::string path = fmt::format("stage[{}].load", k);
     std::size_t at = 0;
     for (const toml::table* entry : tables_at(table, "load", path)) {
-      const std::string& name = stages[k].loads[at].first;
+      const std::string& name = stages[k].loads[at].wall;
       const auto wall = std::ranges::find(walls, name, &Wall::name);
       const auto gone = std::ranges::find(stages, wall->until_stage, &Stage::name);
       if (wall->absent && gone - stages.begin() <= static_cast<std::ptrdiff_t>(k))

@@ -102,7 +102,7 @@ std::string resolved_scene(const Scene& scene) {
     write_section(out, keys.stage, stage, left_out);
     if (stage.stress.any()) write_section(out, keys.stage_stress, stage.stress);
     write_section(out, keys.stage_end, stage.end);
-    for (const NamedLoad& load : stage.loads) write_section(out, keys.stage_load, load);
+    for (const StageLoad& load : stage.loads) write_section(out, keys.stage_load, load);
     for (const PairSpec& pair : pairs_of(stage.laws, scene.materials))
       write_section(out, keys.stage_pair, pair);
   }

@@ -1,7 +1,6 @@
 #include "kernels/clusters/cluster_problem.hpp"
 
 #include <algorithm>
-#include <array>
 #include <iterator>
 #include <map>
 #include <tuple>
@@ -39,7 +38,7 @@ std::vector<std::vector<Place>> places_of(const BodyParts& parts) {
 /// A contact that has yet to find its bodies in a cluster's problem.
 struct Joint {
   Place place = {};
-  ContactEquation equation;  ///< first and second are not set
+  ContactEquation equation;  ///< its first and second are numbers of a part, and mean nothing here
   Place first = {}, second = {};
   Vec3 impulse = Vec3::Zero();
   RollingPart rolling = {};
@@ -65,8 +64,8 @@ RollingPart rolling_of(const BodyProblem& part, std::size_t k) {
 /// list serves to write, to read and to count them, so that none is written and not read.
 template <class Row>
 void each_number(Row&& row, std::int32_t& cluster, Place& place, BodyUnknown& body) {
-  row(cluster, place.subdomain, place.number, body.mass, body.spin_mass, body.radius, body.wall, body.cell,
-      body.x, body.axis, body.shears, body.free.u, body.free.w);
+  row(cluster, place.subdomain, place.number, body.mass, body.spin_mass, body.radius, body.kind, body.x,
+      body.axis, body.shears, body.free.u, body.free.w);
 }
 template <class Row>
 void each_number(Row&& row, std::int32_t& cluster, Joint& joint) {
@@ -86,7 +85,7 @@ class RowWriter {
  private:
   template <class T>
   void put(const T& value) {
-    if constexpr (std::is_arithmetic_v<T>)
+    if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>)
       to_.push_back(static_cast<double>(value));
     else
       to_.insert(to_.end(), value.data(), value.data() + value.size());
@@ -104,7 +103,7 @@ class RowReader {
   void take(T& value) {
     if constexpr (std::is_same_v<T, bool>)
       value = row_[next_++] != 0;
-    else if constexpr (std::is_arithmetic_v<T>)
+    else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>)
       value = static_cast<T>(row_[next_++]);
     else
       for (double& number : value.reshaped()) number = row_[next_++];
@@ -113,20 +112,12 @@ class RowReader {
   std::size_t next_ = 0;
 };
 
-void append(std::vector<double>& to, const std::vector<double>& row) {
-  to.insert(to.end(), row.begin(), row.end());
+void write_body(std::vector<double>& to, std::int32_t cluster, Place place, BodyUnknown body) {
+  each_number(RowWriter(to), cluster, place, body);
 }
 
-std::vector<double> row_of_body(std::int32_t cluster, Place place, BodyUnknown body) {
-  std::vector<double> row;
-  each_number(RowWriter(row), cluster, place, body);
-  return row;
-}
-
-std::vector<double> row_of_joint(std::int32_t cluster, Joint joint) {
-  std::vector<double> row;
-  each_number(RowWriter(row), cluster, joint);
-  return row;
+void write_joint(std::vector<double>& to, std::int32_t cluster, Joint joint) {
+  each_number(RowWriter(to), cluster, joint);
 }
 
 void read_body(std::span<const double> row, std::vector<Pieces>& spanning) {
@@ -176,7 +167,7 @@ std::vector<Pieces> pieces_of_spanning(const BodyParts& parts, const Clusters& c
     for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
       if (const std::int32_t number = spanning(static_cast<std::int32_t>(b));
           number >= 0 && parts[p].counted(b))
-        append(bodies[p], row_of_body(number, places[p][b], parts[p].bodies[b]));
+        write_body(bodies[p], number, places[p][b], parts[p].bodies[b]);
     for (std::size_t k = 0; k < parts[p].contacts.size(); ++k) {
       const ContactEquation& c = parts[p].contacts[k];
       const std::int32_t number = spanning(c.first);
@@ -184,12 +175,15 @@ std::vector<Pieces> pieces_of_spanning(const BodyParts& parts, const Clusters& c
       Joint joint = joint_of(parts[p], k, places[p]);
       joint.block = c.levers != nullptr;
       if (joint.block) joint.levers = *c.levers;
-      append(contacts[p], row_of_joint(number, std::move(joint)));
+      write_joint(contacts[p], number, std::move(joint));
     }
   });
   std::vector<Pieces> spanning(at(clusters.several));
-  read_rows(parts.link(), bodies, row_of_body(0, {}, {}).size(), read_body, spanning);
-  read_rows(parts.link(), contacts, row_of_joint(0, {}).size(), read_joint, spanning);
+  std::vector<double> a_body, a_joint;  // for their widths
+  write_body(a_body, 0, {}, {});
+  write_joint(a_joint, 0, {});
+  read_rows(parts.link(), bodies, a_body.size(), read_body, spanning);
+  read_rows(parts.link(), contacts, a_joint.size(), read_joint, spanning);
   return spanning;
 }
 
@@ -215,8 +209,7 @@ ClusterProblem put_together(Pieces pieces) {
   ClusterProblem made;
   // Walls stand behind grains, and a cell behind these (body_problem.hpp).
   std::sort(pieces.bodies.begin(), pieces.bodies.end(), [](const auto& a, const auto& b) {
-    return std::tuple(a.second.cell, a.second.wall, a.first) <
-           std::tuple(b.second.cell, b.second.wall, b.first);
+    return std::tuple(a.second.kind, a.first) < std::tuple(b.second.kind, b.first);
   });
   std::sort(pieces.joints.begin(), pieces.joints.end(),
             [](const Joint& a, const Joint& b) { return a.place < b.place; });
@@ -225,7 +218,7 @@ ClusterProblem put_together(Pieces pieces) {
     unknown.emplace(place, static_cast<std::int32_t>(made.bodies.size()));
     made.bodies.push_back(place);
     made.problem.bodies.push_back(body);
-    if (!body.wall && !body.cell) ++made.problem.grains;
+    if (body.kind == BodyKind::grain) ++made.problem.grains;
   }
   made.levers.reserve(pieces.joints.size());
   const bool rolling = std::ranges::any_of(pieces.joints, [](const Joint& of) { return of.rolling.arm > 0; });

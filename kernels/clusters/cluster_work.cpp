@@ -26,7 +26,7 @@ void add_bodies(const ProblemReader& part, std::span<const Twist> V, std::span<c
   for (std::size_t b = 0; b < part.unknowns(); ++b) {
     if (group[b] < 0 || !part.counted(b)) continue;
     const BodyUnknown body = part.unknown(b);
-    if (body.wall) continue;  // by its impulse
+    if (body.kind == BodyKind::wall) continue;  // by its impulse
     const std::span<double> own = row.subspan(at(group[b]) * width, width);
     own[WorkColumn::energy] += 0.5 * body.mass * (V[b].u - body.free.u).squaredNorm();
     own[WorkColumn::mass] += body.mass;

@@ -10,7 +10,7 @@ namespace talus {
 namespace {
 
 Eigen::Index freedoms_of_body(const BodyUnknown& body) {
-  return body.wall ? 1 : body.spin_mass > 0 ? 6 : 3;
+  return body.kind == BodyKind::wall ? 1 : body.spin_mass > 0 ? 6 : 3;
 }
 
 /// Unknowns before the cell.
@@ -40,7 +40,7 @@ Eigen::VectorXd Freedoms::masses() const {
 
 Freedoms::Part Freedoms::part(std::size_t body, const Twist& of) const {
   Part part{static_cast<std::int32_t>(body), begin(body), count(body)};
-  if (problem_.bodies[body].wall) {
+  if (problem_.bodies[body].kind == BodyKind::wall) {
     part.value[0] = problem_.bodies[body].axis.dot(of.u);
     return part;
   }
@@ -72,7 +72,7 @@ std::vector<Twist> Freedoms::twists(const Eigen::VectorXd& x) const {
   std::vector<Twist> twists(problem_.bodies.size());
   for (std::size_t b = 0; b < plain_bodies(problem_); ++b) {
     const BodyUnknown& body = problem_.bodies[b];
-    if (body.wall) {
+    if (body.kind == BodyKind::wall) {
       twists[b].u = x[begin_[b]] * body.axis;
       continue;
     }

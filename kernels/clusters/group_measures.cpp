@@ -24,7 +24,7 @@ Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
     row[MeasureColumn::mass] += body.mass;
     row[MeasureColumn::incoming] += kinetic2(body, free[b].u, free[b].w);
     row[MeasureColumn::gained] += body.mass * done[b].u.norm() + body.spin_mass * done[b].w.norm();
-    if (body.wall || body.cell) continue;
+    if (body.kind != BodyKind::grain) continue;
     row[MeasureColumn::grains] += body.mass;
     row[MeasureColumn::energy] += 0.5 * body.mass * done[b].u.squaredNorm();
   }

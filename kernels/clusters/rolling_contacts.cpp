@@ -12,7 +12,7 @@ namespace {
 
 /// I [kg m^2]; 0 of what does not turn.
 double inertia(const BodyUnknown& body) {
-  return body.wall ? 0 : body.spin_mass * body.radius * body.radius;
+  return body.kind == BodyKind::wall ? 0 : body.spin_mass * body.radius * body.radius;
 }
 /// The second body of a contact is missing at a driven wall.
 bool turns(const BodyProblem& problem, std::int32_t body) {
@@ -124,7 +124,7 @@ BodyProblem with_moments(const BodyProblem& problem, std::span<const Vec3> chang
     other.rolling[k].moment += change[k];
   }
   for (std::size_t b = 0; b < force.size(); ++b)
-    if (other.bodies[b].spin_mass > 0 && !other.bodies[b].cell)
+    if (other.bodies[b].spin_mass > 0 && other.bodies[b].kind != BodyKind::cell)
       other.bodies[b].free.w += force[b].w / other.bodies[b].spin_mass;
   return other;
 }

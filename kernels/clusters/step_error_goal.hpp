@@ -11,8 +11,9 @@ namespace talus {
 struct StepErrorThresholds {
   ClusterThresholds cluster;
   /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them.
-  /// Small, as grains that friction jams between walls keep the forces of their landing: a ball of which the
-  /// walls bear 10⁵ times its weight must still not rise.
+  /// Small, as grains that friction jams between walls keep the forces of their landing: of a ball that
+  /// presses them with 10⁵ times its weight it is a thousandth of that; not 0, as grains pressed at rest
+  /// between walls do nothing else, and rounding leaves 10⁻¹⁶ of these forces.
   double pressed = 1e-8;
   /// Of what all clusters do, per mass, in (0, 1): one that does less is measured by this part of it, and the
   /// impulses of its contacts, too. What happens elsewhere in a step must not hide that a column at rest
@@ -38,7 +39,8 @@ struct StepErrorThresholds {
   /// Heaviest over lightest body of a group, > 1, beyond which that momentum is not of all its mass, but what
   /// the answer changes by (felt_rounding.hpp).
   double lopsided = 100;
-  /// Part of the scale of a group, in (0, 1): rounding that makes less is not looked at as closely as that.
+  /// ... where what rounding makes of all its mass, over what is asked for, is more than this part, in (0,
+  /// 1), of the scale of the group: less changes no verdict.
   double slight = 1e-2;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
   /// nothing of what they have not.

@@ -49,7 +49,7 @@ class ShiftedMatrix {
 
 }  // namespace detail
 
-/// ADMM on the way, to be paused between any two iterations.
+/// ADMM, to be paused between any two iterations.
 class AdmmIteration {
  public:
   /// `form` must outlive this. `r` is the start.

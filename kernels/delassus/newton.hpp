@@ -35,7 +35,7 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
 /// meaning without.
 bool lawful(const DelassusProblem& problem, std::int64_t& failed_contacts);
 
-/// Newton's method on the way, to be paused between any two steps.
+/// Newton's method, to be paused between any two steps.
 class NewtonIteration {
  public:
   /// `form` must outlive this. `r` is the start.

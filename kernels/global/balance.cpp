@@ -47,7 +47,7 @@ Wishes wishes_of(BodyProblem& problem, const PartGroups& part, std::span<const T
     ContactEquation c = problem.contacts[k];
     const std::size_t g = part.group(c);
     const Vec3 r = problem.impulse[k], v = constrained_velocity(c, V);
-    if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
+    if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].kind == BodyKind::wall)
       wishes.pressed[g] += std::abs(c.normal.dot(r));
     if (c.cell >= 0)  // what its faces carry, as walls would
       wishes.pressed[g] += c.branch.norm() / problem.bodies[static_cast<std::size_t>(c.cell)].radius *

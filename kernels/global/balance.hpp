@@ -33,8 +33,8 @@ struct BalanceThresholds {
   /// smaller than the error.
   double caution = 3;
   /// Part of the impulses at walls, in (0, 1), that an error is compared with at least where no wall is
-  /// driven. It is what a reader of the results cares for, so that of the work of errors
-  /// (CertificateThresholds) reads it here.
+  /// driven. It is what a reader of the results cares for, and the check of the work of
+  /// errors (CertificateThresholds) reads it here.
   double interest = 1e-2;
   /// Groups whose stiffness is estimated one by one, >= 1; others have one estimate together.
   int most_groups = 16;

@@ -125,8 +125,7 @@ std::vector<std::vector<std::int32_t>> heavy_unknowns(const BodyParts& parts, do
     for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
       const double mass = around[p][b].u[0], neighbours = around[p][b].u[1];
       if (problem.counted(b) && neighbours > 0 &&
-          (problem.bodies[b].wall || problem.bodies[b].cell ||
-           problem.bodies[b].mass * neighbours > ratio * mass))
+          (problem.bodies[b].kind != BodyKind::grain || problem.bodies[b].mass * neighbours > ratio * mass))
         heavy[p].push_back(static_cast<std::int32_t>(b));
     }
   });

@@ -33,6 +33,9 @@ inline double dot(const Twist& a, const Twist& b) {
   return a.u.dot(b.u) + a.w.dot(b.w);
 }
 
+/// What an unknown of a problem is; in this order they stand (BodyProblem::grains).
+enum class BodyKind : std::uint8_t { grain, wall, cell };
+
 /// One body. A wall never rotates and moves along `axis` only; its part of a Twist is (velocity x axis, 0). A
 /// cell (kernels/bodies/cell_velocity.hpp) has u = (xx, yy, zz) and w = (xy, xz, yz), of which those move
 /// whose entry of `axis`, and of `shears`, is 1; its `radius` is its edge over d.
@@ -43,7 +46,7 @@ struct BodyUnknown {
   double radius = 0;           ///< [m]
   Vec3 axis = Vec3::Zero();    ///< of a wall: its normal, unit
   Vec3 shears = Vec3::Zero();  ///< of a cell
-  bool wall = false, cell = false;
+  BodyKind kind = BodyKind::grain;
   Twist free;  ///< velocity without contacts
 };
 
@@ -51,8 +54,8 @@ struct BodyUnknown {
 /// wall. With levers v = u_first - u_second + B_first w_first - B_second w_second - drive. In a cell that
 /// follows a stress v gains U b/d (cell_velocity.hpp).
 struct ContactEquation {
-  Vec3 normal;  ///< unit, to the first body
-  Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
+  Vec3 normal = Vec3::Zero();  ///< unit, to the first body
+  Vec3 offset = Vec3::Zero();  ///< b n - (velocity of the driven wall) [m/s]
   double mu = 0;
   std::int32_t first = -1;         ///< unknown
   std::int32_t second = -1;        ///< unknown; -1 at a driven wall
@@ -90,7 +93,7 @@ struct BodyProblem {
 
   bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
   /// A cell that follows a stress stands last, behind the walls.
-  bool has_cell() const { return !bodies.empty() && bodies.back().cell; }
+  bool has_cell() const { return !bodies.empty() && bodies.back().kind == BodyKind::cell; }
   std::size_t walls() const { return bodies.size() - grains - (has_cell() ? 1 : 0); }  ///< of finite mass
 };
 
@@ -249,12 +252,12 @@ inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> 
 
 /// Drops what cannot move a body: of walls all but the part along the axis, of bodies that do not turn w.
 inline void restrict_to_freedoms(const BodyUnknown& body, Twist& f) {
-  if (body.cell) {
+  if (body.kind == BodyKind::cell) {
     f = {f.u.cwiseProduct(body.axis), f.w.cwiseProduct(body.shears)};
     return;
   }
-  if (body.wall) f.u = body.axis.dot(f.u) * body.axis;
-  if (body.wall || body.spin_mass == 0) f.w.setZero();
+  if (body.kind == BodyKind::wall) f.u = body.axis.dot(f.u) * body.axis;
+  if (body.kind == BodyKind::wall || body.spin_mass == 0) f.w.setZero();
 }
 
 /// In place, from the sum of forces on a body: V = V_free + M^-1 F.

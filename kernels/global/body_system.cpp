@@ -141,7 +141,7 @@ void BodySystem::close() {
       continue;
     }
     const BodyUnknown& body = problem_.bodies[b];
-    if (body.cell) {
+    if (body.kind == BodyKind::cell) {
       Matrix6 block = diagonal_[b];
       block.diagonal().array() += body.mass;
       Eigen::Matrix<double, 6, 1> free;
@@ -149,7 +149,7 @@ void BodySystem::close() {
       block = free.asDiagonal() * block * free.asDiagonal();
       block.diagonal() += Eigen::Matrix<double, 6, 1>(Eigen::Matrix<double, 6, 1>::Ones() - free);
       inverse = free.asDiagonal() * block.llt().solve(Matrix6::Identity()) * free.asDiagonal();
-    } else if (body.wall) {
+    } else if (body.kind == BodyKind::wall) {
       const double stiffness = body.mass + body.axis.dot(diagonal_[b].topLeftCorner<3, 3>() * body.axis);
       inverse.topLeftCorner<3, 3>() = body.axis * body.axis.transpose() / stiffness;
     } else if (body.spin_mass == 0) {

@@ -240,7 +240,7 @@ CoarseLevel::ContactMotion CoarseLevel::contact_motion(std::size_t p, const Cont
   const double sign = is_first ? 1 : -1;
   const BodyUnknown& body = parts_[p].bodies[at(index)];
   ContactMotion motion = ContactMotion::Zero();
-  if (body.wall) {
+  if (body.kind == BodyKind::wall) {
     motion.col(0) = sign * body.axis;
     return motion;
   }
@@ -285,7 +285,7 @@ std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<
     const BodyUnknown& body = problem.bodies[b];
     const std::int64_t g = block.group_of(static_cast<std::int32_t>(b));
     if (!problem.counted(b) || g < 0) continue;
-    if (body.wall) {
+    if (body.kind == BodyKind::wall) {
       block(g, g)(0, 0) += body.mass;
       continue;
     }

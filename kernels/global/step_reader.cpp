@@ -10,7 +10,7 @@ namespace {
 BodyUnknown unknown_of_wall(const WallMotion& wall) {
   BodyUnknown body;
   body.mass = 1 / wall.inv_mass;
-  body.wall = true;
+  body.kind = BodyKind::wall;
   body.axis = wall.normal;
   body.free.u = wall.normal.dot(wall.free_velocity) * wall.normal;
   return body;
@@ -22,7 +22,7 @@ BodyUnknown unknown_of_cell(const CellMotion& cell) {
   body.radius = cell.edge;
   body.axis = cell.stretches;
   body.shears = cell.shears;
-  body.cell = true;
+  body.kind = BodyKind::cell;
   return body;
 }
 
@@ -171,7 +171,7 @@ void StepReader::add_moment(std::size_t place, const ContactEquation& contact, s
   const auto turn = [&](std::int32_t body, double sign) {
     if (body < 0) return;
     const BodyUnknown unknown = unknown_of_source(at(body));
-    if (!unknown.wall) known[at(body)].w += sign / unknown.radius * moment;
+    if (unknown.kind != BodyKind::wall) known[at(body)].w += sign / unknown.radius * moment;
   };
   turn(contact.first, 1);
   turn(contact.second, -1);

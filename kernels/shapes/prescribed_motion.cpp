@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace talus {
 
@@ -213,12 +212,9 @@ double largest_acceleration(std::span<const MotionPart> parts) {
 
 double shortest_period(std::span<const MotionPart> parts) {
   double period = std::numeric_limits<double>::infinity();
-  for (const MotionPart& part : parts) {
+  for (const MotionPart& part : parts)
     if (part.kind == MotionPart::Kind::oscillation && part.amplitude != 0)
       period = std::min(period, 1 / part.frequency);
-    if (part.kind == MotionPart::Kind::rotation && part.rate != 0 && !part.surface_only)
-      period = std::min(period, 2 * std::numbers::pi / std::abs(part.rate));
-  }
   return period;
 }
 

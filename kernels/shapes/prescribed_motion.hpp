@@ -104,7 +104,7 @@ RigidVelocity mean_surface_velocity(std::span<const MotionPart> parts, double ti
 
 /// Bound on the acceleration of oscillations [m/s^2].
 double largest_acceleration(std::span<const MotionPart> parts);
-/// The shortest period of an oscillation, or whole turn of a wall that turns [s]; infinity where none does.
+/// The shortest period of an oscillation [s]; infinity where there is none.
 double shortest_period(std::span<const MotionPart> parts);
 
 }  // namespace talus

@@ -76,13 +76,13 @@ void validate_stress(const Setup& setup, const Stage& stage) {
           "xyz"[setup.domain.edges()[first] == 0 ? first : second], names[k]));
     if (load.to[k] && rates[k] != 0)
       refuse_key(names[k], "has a rate, too; a component follows either a rate or a stress");
-    if ((load.to[k] && !std::isfinite(*load.to[k])) || !std::isfinite(load.amplitude[k]))
-      refuse_key(names[k], "must be finite [Pa]");
+    const std::string amplitude = fmt::format("amplitude_{}", names[k]);
+    if (load.to[k] && !std::isfinite(*load.to[k])) refuse_key(names[k], "must be finite [Pa]");
+    if (!std::isfinite(load.amplitude[k])) refuse_key(amplitude, "must be finite [Pa]");
     if (!load.to[k] && load.amplitude[k] != 0)
-      refuse_key(fmt::format("amplitude_{}", names[k]),
-                 fmt::format("swings about {}, which is not given", names[k]));
+      refuse_key(amplitude, fmt::format("swings about {}, which is not given", names[k]));
   }
-  if (swings && !(load.period > 0)) refuse("swings need a period > 0 [s]");
+  if (swings && !(load.period > 0)) refuse_key("period", "swings need one > 0 [s]");
   const bool chosen = stage.chooses_time_step;
   const double longest =
                    stage.time_step_max > 0 ? stage.time_step_max : std::numeric_limits<double>::infinity(),

@@ -14,6 +14,10 @@
 
 namespace talus {
 
+/// Part by which what is inserted may exceed `count`, `mass` or a rate, as rounding of these takes no grain
+/// away.
+inline constexpr double amount_rounding = 1e-9;
+
 /// When a rule acts.
 struct RuleTimes {
   double from = 0;                                         ///< [s]

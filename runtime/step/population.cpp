@@ -128,7 +128,7 @@ double Population::mass_of_grain(std::size_t rule, std::int64_t number) const {
 void Population::draw_due(std::size_t i, const StepSpan& step) {
   const InsertRule& rule = setup_.inserts[i];
   const double time = std::min(rule_time(rule.times, step, step.end), rule.times.until) - rule.times.from;
-  const auto within = [](double amount, double limit) { return amount <= limit * (1 + rounding); };
+  const auto within = [](double amount, double limit) { return amount <= limit * (1 + amount_rounding); };
   for (;;) {
     const auto next = static_cast<double>(now_.drawn[i] + 1);
     if ((rule.count && now_.drawn[i] >= *rule.count) || (rule.rate && !within(next, *rule.rate * time)))

@@ -63,14 +63,16 @@ void check_strain(const StepState& state, double time_step, double most, const S
       step.text(), strain, most));
 }
 
-/// Rates that are given close a cell whatever its grains bear.
+/// Rates that are given close a cell whatever its grains bear, and some begin too full.
 void check_room(const StepOutcome& outcome) {
   const double room = outcome.state.domain.edges().prod();  // 0 where an axis does not repeat
   if (room == 0 || outcome.sample.volume <= room) return;
-  throw NoSpaceError(fmt::format(
-      "{}: the cell has {:.3g} m^3 left, less than its grains, {:.3g} m^3. End the stage sooner, or let the "
-      "cell follow a stress",
-      outcome.step.text(), room, outcome.sample.volume));
+  const bool driven = !outcome.state.flow.before.isZero(0) && !outcome.state.cell.loaded();
+  throw NoSpaceError(fmt::format("{}: the cell has {:.3g} m^3, less than its grains, {:.3g} m^3. {}",
+                                 outcome.step.text(), room, outcome.sample.volume,
+                                 driven ? "End the stage sooner, or let the cell follow a stress"
+                                        : "Its grains overlap by far: make it larger, or the time step "
+                                          "shorter"));
 }
 
 /// Energy of grains at the speed that attractions give one of mean size at a wall in a step [J]. It is no

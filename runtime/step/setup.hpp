@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
@@ -86,6 +85,12 @@ struct StressLoad {
   }
 };
 
+/// A wall whose load a stage changes.
+struct StageLoad {
+  std::string wall;  ///< its name
+  WallLoad load;
+};
+
 /// One stage: a time interval with its own loads.
 struct Stage {
   std::string name;
@@ -107,8 +112,8 @@ struct Stage {
     const bool alike = (strain_rates.array() == strain_rates[0]).all();
     return !alike || !shear_rates.isZero(0) || stress.any();
   }
-  PairTable laws;                                       ///< of the setup's materials
-  std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
+  PairTable laws;                ///< of the setup's materials
+  std::vector<StageLoad> loads;  ///< that change when the stage begins
   StageEnd end;
 };
 

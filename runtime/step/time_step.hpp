@@ -29,7 +29,7 @@ struct TimeStepRule {
   double longest_way = 0.5;
   /// Largest strain of a periodic cell by its prescribed rates in a step, > 0.
   double longest_strain = 0.1;
-  /// Steps in a period of a wall that oscillates, or in a turn, at least; > 2, so that it is seen at all.
+  /// Steps in a period of a wall that oscillates, at least; > 2, so that it is seen at all.
   double steps_of_period = 20;
   /// Ratio of the longest to the shortest time step where the scene gives no shortest one, >= 1.
   double range = 1024;

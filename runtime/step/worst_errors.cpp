@@ -36,7 +36,7 @@ WorstErrors worst_errors_of(const ProblemReaders& parts, const Residuals& residu
     });
     for (std::size_t b = 0; b < problem.unknowns(); ++b) {
       const double error = residuals.body[p][b];
-      if (!problem.counted(b) || problem.unknown(b).cell) continue;  // a cell has no name
+      if (!problem.counted(b) || problem.unknown(b).kind == BodyKind::cell) continue;  // a cell has no name
       if (!(error > 0) || error < worst.body_error) continue;
       worst.take({0,
                   {},

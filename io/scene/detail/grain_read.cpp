@@ -35,7 +35,7 @@ void check_amount(const toml::table& table, const std::string& path, const Inser
     fail_at(*table.get("track"), path + ".track",
             fmt::format("writes every grain in every step: give a count of {} at most", few));
   if (const double least = sphere_mass(smallest_radius(rule.radii), rule.density);
-      rule.mass && *rule.mass < least)
+      rule.mass && *rule.mass * (1 + amount_rounding) < least)
     fail_at(*table.get("mass"), path + ".mass",
             fmt::format("{:g} kg is less than the smallest grain has, {:g} kg: none would come", *rule.mass,
                         least));

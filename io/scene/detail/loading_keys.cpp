@@ -243,10 +243,10 @@ Section<StageEnd> stage_end_keys() {
       }};
 }
 
-Section<NamedLoad> stage_load_keys() {
-  std::vector<Key<NamedLoad>> keys = {
-      key<NamedLoad>("wall", "", any, "Name of the wall.", &NamedLoad::first).need()};
-  for (auto& load_key : within(load_keys(), &NamedLoad::second)) keys.push_back(std::move(load_key));
+Section<StageLoad> stage_load_keys() {
+  std::vector<Key<StageLoad>> keys = {
+      key<StageLoad>("wall", "", any, "Name of the wall.", &StageLoad::wall).need()};
+  for (auto& load_key : within(load_keys(), &StageLoad::load)) keys.push_back(std::move(load_key));
   return {"[[stage.load]]",
           "A load that changes when the stage begins; the whole load of the wall is given anew.",
           std::move(keys)};

@@ -2,16 +2,12 @@
 
 #include <cstddef>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "io/scene/detail/scene_key.hpp"
 #include "io/scene/scene.hpp"
 
 namespace talus::io::detail {
-
-/// A load as a stage names it: wall and what moves it.
-using NamedLoad = std::pair<std::string, WallLoad>;
 
 /// `time_step` of the stage that `stage_of` finds in a Part: a number, or "auto".
 template <class Part, class StageOf>
@@ -35,7 +31,7 @@ Key<Part> time_step_key(const char* meaning, StageOf stage_of) {
 Section<Wall> wall_keys();
 Section<Stage> stage_keys();
 Section<StageEnd> stage_end_keys();
-Section<NamedLoad> stage_load_keys();
+Section<StageLoad> stage_load_keys();
 
 /// The six sides of a box, in the order of its walls: x-, x+, y-, y+, z-, z+.
 const std::vector<std::string>& sides();

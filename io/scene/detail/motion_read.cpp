@@ -1,7 +1,10 @@
 #include "io/scene/detail/motion_read.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -93,6 +96,12 @@ std::optional<double> time_of(const Scene& scene, StageRange stages) {
   return sum;
 }
 
+/// Of a wall that turns by one rate [s]; infinity of one that stands, or whose surface alone moves.
+double time_of_turn(const MotionPart& part) {
+  const bool stands = part.rate == 0 || part.surface_only;
+  return stands ? std::numeric_limits<double>::infinity() : 2 * std::numbers::pi / std::abs(part.rate);
+}
+
 void check_parts(const toml::table& table, const std::string& path, const Scene& scene,
                  const std::vector<MotionPart>& parts) {
   std::size_t k = 0;
@@ -111,13 +120,14 @@ void check_parts(const toml::table& table, const std::string& path, const Scene&
                       part.table->end(), *time));
     for (std::size_t s = stages.from; s < stages.until; ++s) {
       const Stage& stage = scene.setup.stages[s];
-      const double period = shortest_period({&part, 1});
+      const double period = turns ? time_of_turn(part) : shortest_period({&part, 1});
+      const double step = stage.chooses_time_step ? stage.time_step_min : stage.time_step;
       constexpr double steps_of_period = 8;
-      if (stage.time_step * steps_of_period > period)
+      if (step * steps_of_period > period)
         fail_at(*entry->get(key), here + "." + key,
-                fmt::format("a {} of {:g} s has less than {} steps of {:g} s in stage '{}'. Reduce its "
-                            "time_step, or let it be \"auto\"",
-                            turns ? "turn" : "period", period, steps_of_period, stage.time_step, stage.name));
+                fmt::format("a {} of {:g} s has less than {} steps of {:g} s in stage '{}'. Reduce its {}",
+                            turns ? "turn" : "period", period, steps_of_period, step, stage.name,
+                            stage.chooses_time_step ? "time_step_min" : "time_step, or let it be \"auto\""));
     }
   }
 }

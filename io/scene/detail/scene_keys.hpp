@@ -26,7 +26,7 @@ struct SceneKeys {
   Section<Stage> stage;
   Section<StressLoad> stage_stress;
   Section<StageEnd> stage_end;
-  Section<NamedLoad> stage_load;
+  Section<StageLoad> stage_load;
   Section<PairSpec> stage_pair;
   Section<DetectionSettings> detection;
   Section<SolverSettings> solver;

@@ -60,10 +60,10 @@ TEST(Scene, StageLoadsAreReadInOrder) {
                   file);
   const auto& loads = scene.setup.stages[0].loads;
   ASSERT_EQ(loads.size(), 2u);
-  EXPECT_EQ(loads[0].first, "z+");
-  EXPECT_EQ(loads[0].second.velocity, Vec3(0, 0, -1));
-  EXPECT_EQ(loads[1].second.force, 3);
-  EXPECT_EQ(loads[1].second.mass, 2);
+  EXPECT_EQ(loads[0].wall, "z+");
+  EXPECT_EQ(loads[0].load.velocity, Vec3(0, 0, -1));
+  EXPECT_EQ(loads[1].load.force, 3);
+  EXPECT_EQ(loads[1].load.mass, 2);
 }
 
 TEST(Scene, ObliqueWallsAreGivenByNormalAndPoint) {
@@ -158,7 +158,7 @@ TEST(PlaceWalls, SidesStandAtTheBaseAndTheLidOnTheHighestGrain) {
   EXPECT_EQ(walls[5].point, Vec3(0, 0, 0.05));
   const double tenth = 0.1 * (mass(grains, 0) + mass(grains, 1));
   EXPECT_DOUBLE_EQ(walls[5].load.mass, tenth);
-  EXPECT_DOUBLE_EQ(scene.setup.stages[0].loads[0].second.mass, tenth);
+  EXPECT_DOUBLE_EQ(scene.setup.stages[0].loads[0].load.mass, tenth);
   EXPECT_EQ(walls[0].load.mass, 0);
 }
 

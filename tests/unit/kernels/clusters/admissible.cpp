@@ -94,7 +94,7 @@ TEST(Admissible, AWallOfFiniteMassIsPushedAway) {
     add_grain(problem, Vec3::Zero(), 0);
     BodyUnknown lid;
     lid.mass = mass;
-    lid.wall = true;
+    lid.kind = BodyKind::wall;
     lid.axis = Vec3::UnitX();
     lid.free.u = -Vec3::UnitX();
     problem.bodies.push_back(lid);

@@ -27,7 +27,7 @@ BodyProblem bodies(int grains, double mu, int walls) {
   for (int k = 0; k < walls; ++k) {
     BodyUnknown wall;
     wall.mass = 5;
-    wall.wall = true;
+    wall.kind = BodyKind::wall;
     wall.axis = Vec3::UnitX();
     problem.bodies.push_back(wall);
   }

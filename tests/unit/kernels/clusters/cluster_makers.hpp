@@ -66,7 +66,7 @@ inline BodyProblem under_a_lid(double lean, double gap, double lid_mass, double 
   }
   BodyUnknown lid;
   lid.mass = lid_mass;
-  lid.wall = true;
+  lid.kind = BodyKind::wall;
   lid.axis = -Vec3::UnitZ();
   lid.free.u = -Vec3::UnitZ() / lid_mass;
   problem.bodies.push_back(lid);

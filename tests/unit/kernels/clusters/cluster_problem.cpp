@@ -55,7 +55,7 @@ BodyProblem heaps(int count, double mu, double plate, std::uint32_t seed) {
   if (plate > 0) {
     BodyUnknown wall;
     wall.mass = plate;
-    wall.wall = true;
+    wall.kind = BodyKind::wall;
     wall.axis = -Vec3::UnitZ();
     wall.free.u = Vec3(0, 0, fall);
     problem.bodies.push_back(wall);
@@ -215,11 +215,12 @@ TEST(ClusterProblem, HasEachBodyAndContactOnce) {
     contacts += cluster.contacts.size();
     for (const BodyUnknown& body : cluster.problem.bodies) {
       mass += body.mass;
-      walls += body.wall ? 1 : 0;
+      walls += body.kind == BodyKind::wall ? 1 : 0;
     }
     EXPECT_LE(cluster.problem.grains, cluster.problem.bodies.size());
     for (std::size_t b = 0; b < cluster.problem.bodies.size(); ++b)
-      EXPECT_EQ(cluster.problem.bodies[b].wall, b >= cluster.problem.grains) << "walls stand behind grains";
+      EXPECT_EQ(cluster.problem.bodies[b].kind == BodyKind::wall, b >= cluster.problem.grains)
+          << "walls stand behind grains";
   }
   double all = 0;
   for (const BodyUnknown& body : whole.bodies) all += body.mass;

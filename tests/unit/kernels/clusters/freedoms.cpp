@@ -19,12 +19,12 @@ BodyProblem three_bodies(bool cell) {
   cluster_makers::add_grain(problem, Vec3(0.02, 0, 0), 0.5);
   BodyUnknown wall;
   wall.mass = 7;
-  wall.wall = true;
+  wall.kind = BodyKind::wall;
   wall.axis = Vec3::UnitZ();
   problem.bodies.push_back(wall);
   if (!cell) return problem;
   BodyUnknown of;
-  of.cell = true;
+  of.kind = BodyKind::cell;
   of.mass = of.spin_mass = 3;
   of.radius = 3;
   of.axis = Vec3::Ones();

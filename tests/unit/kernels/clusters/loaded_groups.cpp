@@ -21,7 +21,7 @@ BodyProblem row() {
   for (int k = 0; k < 3; ++k) add_grain(problem, Vec3(0.02 * k, 0, 0.01), 0);
   BodyUnknown wall;
   wall.mass = 1;
-  wall.wall = true;
+  wall.kind = BodyKind::wall;
   wall.axis = -Vec3::UnitY();
   problem.bodies.push_back(wall);
   for (std::int32_t k = 0; k < 2; ++k) add_contact(problem, k + 1, k, Vec3::UnitX(), 0);  // 0, 1
@@ -44,7 +44,7 @@ TEST(LoadedGroups, AreJoinedByContactsThatCarryHoweverLittle) {
   EXPECT_EQ(groups[1].problem.contacts[0].first, 0);
   EXPECT_EQ(groups[2].bodies, Numbers{3});
   EXPECT_EQ(groups[2].problem.grains, 0U);
-  EXPECT_TRUE(groups[2].problem.bodies[0].wall);
+  EXPECT_TRUE(groups[2].problem.bodies[0].kind == BodyKind::wall);
 }
 
 TEST(LoadedGroups, AreJoinedByAWallOfFiniteMassWhereItPresses) {
@@ -63,7 +63,7 @@ TEST(LoadedGroups, OfACellThatFollowsAStressAreOne) {
   BodyProblem problem = row();
   BodyUnknown cell;
   cell.mass = 1;
-  cell.cell = true;
+  cell.kind = BodyKind::cell;
   problem.bodies.push_back(cell);
   for (ContactEquation& c : problem.contacts) c.cell = 4;
   EXPECT_EQ(loaded_groups(problem, carrying(problem)).size(), 1U);

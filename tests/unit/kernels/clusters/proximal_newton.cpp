@@ -91,6 +91,10 @@ TEST(ProximalSteps, DoNotTakeForcesWithoutBoundForAnAnswer) {
   }
   double work = 1e9;
   EXPECT_FALSE(proximal_correction(problem, {.enough = 1e-2}, {}, {}, work).settled);
+  // It is that bound which tells: without it the last step seems to change next to nothing.
+  ProximalThresholds boundless;
+  boundless.most_growth = 1e300;
+  EXPECT_TRUE(proximal_correction(problem, {.enough = 1e-2}, {}, boundless, work).settled);
 }
 
 TEST(ProximalSteps, KeepToTheirWorkAndSaySo) {

@@ -134,7 +134,7 @@ BodyProblem row_in_a_cell(double momentum, double part) {
     problem.impulse.back() = part * momentum / 3 * Vec3::UnitX();
   }
   BodyUnknown cell;
-  cell.cell = true;
+  cell.kind = BodyKind::cell;
   cell.mass = cell.spin_mass = 3;
   cell.radius = 3;  // its edge over d
   cell.axis = Vec3::Ones();

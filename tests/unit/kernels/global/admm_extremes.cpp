@@ -40,7 +40,7 @@ BodyProblem lidded_row(double unit, double lid) {
   problem.grains = grains;
   BodyUnknown wall;
   wall.mass = lid * unit;
-  wall.wall = true;
+  wall.kind = BodyKind::wall;
   wall.axis = -Vec3::UnitZ();
   wall.free.u = Vec3(0, 0, -1e-2);
   problem.bodies.push_back(wall);

@@ -29,7 +29,7 @@ class Cut : public PartLink {
       contacts_[static_cast<std::size_t>(part_of[k])].push_back(k);
     }
     for (std::size_t b = 0; b < stands.size(); ++b) {
-      if (whole.bodies[b].wall)
+      if (whole.bodies[b].kind == BodyKind::wall)
         for (std::size_t p = 0; p < count; ++p) add(b, static_cast<std::int32_t>(p));
       if (stands[b].empty()) stands[b] = {0};
       std::sort(stands[b].begin(), stands[b].end());
@@ -43,7 +43,7 @@ class Cut : public PartLink {
         if (std::find(in.begin(), in.end(), part.subdomain) == in.end()) continue;
         const auto own = static_cast<std::int32_t>(part.bodies.size());
         unknown[static_cast<std::int32_t>(b)] = own;
-        if (!whole.bodies[b].wall) ++part.grains;
+        if (whole.bodies[b].kind != BodyKind::wall) ++part.grains;
         if (in.size() > 1) part.shared.push_back(own);
         part.counts.push_back(in.front() == part.subdomain ? 1 : 0);
         part.bodies.push_back(whole.bodies[b]);
@@ -115,7 +115,7 @@ inline BodyProblem block(int across, int high, double mu, double plate) {
   if (plate > 0) {
     BodyUnknown wall;
     wall.mass = plate;
-    wall.wall = true;
+    wall.kind = BodyKind::wall;
     wall.axis = -Vec3::UnitZ();
     wall.free.u = Vec3(0, 0, fall);
     problem.bodies.push_back(wall);
