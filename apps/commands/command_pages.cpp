@@ -112,8 +112,7 @@ std::string man_page(std::span<const Command> table) {
       ".SH EXIT STATUS\n.TP\n.B 0\ndone\n.TP\n.B 1\nfailed\n.TP\n.B 2\nbad input, nothing was "
       "written\n.TP\n.B 3\ndone, but a step or problem missed its tolerance\n.TP\n.B 75\nstopped, and "
       "\\-\\-resume goes on from there\n.SH SEE ALSO\ndocs/tutorial.md, docs/scenes.md and docs/formats.md "
-      "of the sources, "
-      "in /usr/share/doc/talus of the package\n";
+      "of the sources, in /usr/share/doc/talus of the package\n";
   return page;
 }
 

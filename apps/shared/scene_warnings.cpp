@@ -84,26 +84,26 @@ double latest_end(const io::Scene& scene, const std::string& only) {
   double sum = 0;
   for (const Stage& stage : scene.setup.stages) {
     if (!only.empty() && stage.name != only) continue;
-    const double longest = stage.chooses_time_step ? stage.time_step_max : stage.time_step;
-    double time = stage.end.time ? *stage.end.time + longest : INFINITY;
-    if (stage.end.steps && longest > 0)
-      time = std::min(time, static_cast<double>(*stage.end.steps) * longest);
+    double time = stage.end.time.value_or(INFINITY);
+    if (stage.end.time && !stage.chooses_time_step) time = steps_in(time, stage.time_step) * stage.time_step;
+    if (stage.end.steps) time = std::min(time, static_cast<double>(*stage.end.steps) * stage.longest_step());
     sum += time;
   }
   return sum;
 }
 
-/// What is to happen when the run has ended.
+/// What is to happen when the run has ended. What is due at its very end would come in the step after it.
 void add_late(const io::Scene& scene, std::vector<std::string>& warnings) {
+  constexpr double rounding = 1e-9;
   for (const RemoveRule& rule : scene.setup.removes)
-    if (const double end = std::min(latest_end(scene, rule.times.stage), rule.times.until);
-        !rule.at.empty() && rule.at.back() > end)
-      warnings.push_back(fmt::format("remove '{}': at = {:g} s is never reached: {} by {:g} s", rule.name,
-                                     rule.at.back(),
-                                     rule.times.stage.empty() ? "the run ends" : "its stage ends", end));
+    if (const double end = latest_end(scene, rule.times.stage);
+        !rule.at.empty() && rule.at.back() >= end * (1 - rounding))
+      warnings.push_back(fmt::format("remove '{}': at = {:g} s is never reached: {} ends by {:g} s",
+                                     rule.name, rule.at.back(),
+                                     rule.times.stage.empty() ? "the run" : "its stage", end));
   const double end = latest_end(scene, "");
   for (const ProbeRule& rule : scene.setup.probes)
-    if (rule.every && !rule.every_steps && *rule.every > end)
+    if (rule.every && !rule.every_steps && *rule.every > end * (1 + rounding))
       warnings.push_back(fmt::format("probe '{}': every = {:g} s is never reached: the run ends by {:g} s",
                                      rule.name, *rule.every, end));
 }

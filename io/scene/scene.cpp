@@ -87,9 +87,8 @@ class SceneReader {
       check();
     } catch (const std::invalid_argument& error) {
       const std::string what = error.what();
-      for (const std::string table : {"stage", "wall"})
-        if (what.starts_with(table + " '")) throw error_in(scene_, table, what);
-      throw error_in(scene_, "cell", what.starts_with("cell: ") ? what.substr(6) : what);
+      const bool named = what.starts_with("stage '") || what.starts_with("wall '");
+      throw error_in(scene_, named ? "" : "cell", what.starts_with("cell: ") ? what.substr(6) : what);
     }
   }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "kernels/fields/lucy.hpp"
@@ -34,9 +33,9 @@ void validate_flow(const Setup& setup, const Stage& stage) {
                          "xyz"[pairs[k][1]]));
   }
   // A stage that chooses its steps chooses them by the rates, too.
-  const double step = stage.chooses_time_step ? stage.time_step_min : stage.time_step;
   if (strains_too_far(
-          std::max(stage.strain_rates.cwiseAbs().maxCoeff(), stage.shear_rates.cwiseAbs().maxCoeff()), step))
+          std::max(stage.strain_rates.cwiseAbs().maxCoeff(), stage.shear_rates.cwiseAbs().maxCoeff()),
+          stage.shortest_step()))
     refuse(fmt::format("the cell is strained by more than {} in a step; make {} shorter",
                        TimeStepRule{}.longest_strain,
                        stage.chooses_time_step ? "time_step_min" : "the time step"));
@@ -47,12 +46,11 @@ void validate_stress(const Setup& setup, const Stage& stage) {
   const StressLoad& load = stage.stress;
   const bool swings = std::ranges::any_of(load.amplitude, [](double a) { return a != 0; });
   if (!load.any() && !swings) return;
-  const auto refuse = [&](const std::string& what) {
-    throw std::invalid_argument(fmt::format("stage '{}': stress: {}", stage.name, what));
-  };
   const auto refuse_key = [&](const std::string& key, const std::string& what) {
-    throw std::invalid_argument(fmt::format("stage '{}': stress.{}: {}", stage.name, key, what));
+    throw std::invalid_argument(
+        fmt::format("stage '{}': stress{}: {}", stage.name, key.empty() ? "" : "." + key, what));
   };
+  const auto refuse = [&](const std::string& what) { refuse_key("", what); };
   constexpr const char* names[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
   constexpr std::array<Eigen::Index, 2> axes[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
   for (const Eigen::Index axis : {0, 1, 2})
@@ -70,10 +68,10 @@ void validate_stress(const Setup& setup, const Stage& stage) {
   for (std::size_t k = 0; k < cell_freedoms; ++k) {
     const auto [first, second] = axes[k];
     if (load.to[k] && (setup.domain.edges()[first] == 0 || setup.domain.edges()[second] == 0))
-      refuse(fmt::format(
-          "the cell is not periodic along {}, so that nothing follows {}; load the walls there, or "
-          "give all of cell.lengths",
-          "xyz"[setup.domain.edges()[first] == 0 ? first : second], names[k]));
+      refuse_key(names[k],
+                 fmt::format("the cell is not periodic along {}, so that nothing follows it; load the walls "
+                             "there, or give all of cell.lengths",
+                             "xyz"[setup.domain.edges()[first] == 0 ? first : second]));
     if (load.to[k] && rates[k] != 0)
       refuse_key(names[k], "has a rate, too; a component follows either a rate or a stress");
     const std::string amplitude = fmt::format("amplitude_{}", names[k]);
@@ -83,17 +81,14 @@ void validate_stress(const Setup& setup, const Stage& stage) {
       refuse_key(amplitude, fmt::format("swings about {}, which is not given", names[k]));
   }
   if (swings && !(load.period > 0)) refuse_key("period", "swings need one > 0 [s]");
-  const bool chosen = stage.chooses_time_step;
-  const double longest =
-                   stage.time_step_max > 0 ? stage.time_step_max : std::numeric_limits<double>::infinity(),
-               step = chosen ? longest : stage.time_step;
+  const double step = stage.longest_step();
   constexpr double steps = 4;  // in which a swing still has its amplitude
   if (swings && load.period < steps * step)
     refuse_key(
         "period",
         fmt::format("swings of a period of {} s are not seen in steps of up to {} s; make {} a quarter "
                     "of the period at most",
-                    load.period, step, chosen ? "time_step_max" : "time_step"));
+                    load.period, step, stage.chooses_time_step ? "time_step_max" : "time_step"));
   if (!(load.ramp_time >= 0 && std::isfinite(load.ramp_time)))
     refuse_key("ramp_time", "must be a number >= 0 [s]");
 }

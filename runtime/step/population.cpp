@@ -16,6 +16,10 @@ namespace {
 
 /// A sum of many steps is not exactly their product: a time is reached this part before it.
 constexpr double rounding = 1e-9;
+
+bool within(double amount, double limit) {
+  return amount <= limit * (1 + amount_rounding);
+}
 /// Streams of insertions lie behind those of samples.
 constexpr std::uint32_t first_stream = 0x8000;
 constexpr std::int64_t all_at_once = std::int64_t{1} << 40, fewest_at_once = 16;
@@ -128,7 +132,6 @@ double Population::mass_of_grain(std::size_t rule, std::int64_t number) const {
 void Population::draw_due(std::size_t i, const StepSpan& step) {
   const InsertRule& rule = setup_.inserts[i];
   const double time = std::min(rule_time(rule.times, step, step.end), rule.times.until) - rule.times.from;
-  const auto within = [](double amount, double limit) { return amount <= limit * (1 + amount_rounding); };
   for (;;) {
     const auto next = static_cast<double>(now_.drawn[i] + 1);
     if ((rule.count && now_.drawn[i] >= *rule.count) || (rule.rate && !within(next, *rule.rate * time)))
@@ -285,7 +288,7 @@ bool Population::expects_grains(const StepSpan& step) const {
     if (!waiting_[i].empty()) return true;
     const bool all_drawn =
         (rule.count && now_.drawn[i] >= *rule.count) ||
-        (rule.mass && now_.drawn_mass[i] + mass_of_grain(i, now_.drawn[i]) > *rule.mass * (1 + rounding));
+        (rule.mass && !within(now_.drawn_mass[i] + mass_of_grain(i, now_.drawn[i]), *rule.mass));
     if (!all_drawn) return true;
   }
   return false;

@@ -63,16 +63,18 @@ void check_strain(const StepState& state, double time_step, double most, const S
       step.text(), strain, most));
 }
 
-/// Rates that are given close a cell whatever its grains bear, and some begin too full.
+/// Rates that are given close a cell whatever its grains bear, and some begin too full. Balls of a clump may
+/// overlap, and count whole: what room clumps need is not known.
 void check_room(const StepOutcome& outcome) {
-  const double room = outcome.state.domain.edges().prod();  // 0 where an axis does not repeat
+  const StepState& state = outcome.state;
+  if (!state.domain.repeats || !outcome.setup.clumps.empty()) return;
+  const double room = state.domain.volume(state.walls);  // 0 where nothing bounds it
   if (room == 0 || outcome.sample.volume <= room) return;
-  const bool driven = !outcome.state.flow.before.isZero(0) && !outcome.state.cell.loaded();
+  const bool driven = !outcome.parameters.velocity_gradient.isZero(0);
   throw NoSpaceError(fmt::format("{}: the cell has {:.3g} m^3, less than its grains, {:.3g} m^3. {}",
                                  outcome.step.text(), room, outcome.sample.volume,
-                                 driven ? "End the stage sooner, or let the cell follow a stress"
-                                        : "Its grains overlap by far: make it larger, or the time step "
-                                          "shorter"));
+                                 driven ? "End the stage sooner, or let all of the cell follow a stress"
+                                        : "Its grains overlap by far: make it larger"));
 }
 
 /// Energy of grains at the speed that attractions give one of mean size at a wall in a step [J]. It is no

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -102,6 +103,12 @@ struct Stage {
   Vec3 strain_rates = Vec3::Zero();  ///< of the periodic cell: dv_x/dx, dv_y/dy, dv_z/dz [1/s]
   Vec3 shear_rates = Vec3::Zero();   ///< dv_x/dy, dv_x/dz, dv_y/dz [1/s]
   StressLoad stress;                 ///< of the periodic cell
+  /// Bounds on a step that the scene gives [s]: 0, and infinity, where it leaves that open.
+  double shortest_step() const { return chooses_time_step ? time_step_min : time_step; }
+  double longest_step() const {
+    if (!chooses_time_step) return time_step;
+    return time_step_max > 0 ? time_step_max : std::numeric_limits<double>::infinity();
+  }
   /// The cell may change along an axis.
   bool strains(int axis) const {
     return strain_rates[axis] != 0 || stress.to[static_cast<std::size_t>(axis)].has_value();

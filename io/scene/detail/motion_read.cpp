@@ -121,7 +121,7 @@ void check_parts(const toml::table& table, const std::string& path, const Scene&
     for (std::size_t s = stages.from; s < stages.until; ++s) {
       const Stage& stage = scene.setup.stages[s];
       const double period = turns ? time_of_turn(part) : shortest_period({&part, 1});
-      const double step = stage.chooses_time_step ? stage.time_step_min : stage.time_step;
+      const double step = stage.shortest_step();
       constexpr double steps_of_period = 8;
       if (step * steps_of_period > period)
         fail_at(*entry->get(key), here + "." + key,

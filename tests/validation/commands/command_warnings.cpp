@@ -47,6 +47,13 @@ TEST_F(Warnings, OfWhatIsToHappenWhenTheRunHasEnded) {
   EXPECT_NE(of(column_scene + "[[probe]]\nname = \"p\"\nevery = 900\n" + region)
                 .find("probe 'p': every = 900 s" + end),
             std::string::npos);
+  // The last step is the fourth, and removes what is due before its end.
+  EXPECT_NE(of(column_scene + "[[remove]]\nname = \"r\"\nat = [4e-3]\n" + region)
+                .find("remove 'r': at = 0.004 s" + end),
+            std::string::npos);
+  EXPECT_NE(of(column_scene + "[[remove]]\nname = \"r\"\nat = [1]\nstage = \"rest\"\n" + region)
+                .find("remove 'r': at = 1 s is never reached: its stage ends by 0.004 s"),
+            std::string::npos);
   EXPECT_EQ(of(column_scene + "[[remove]]\nat = [1e-3]\n" + region + "[[probe]]\nevery = 1e-3\n" + region),
             "");
 }

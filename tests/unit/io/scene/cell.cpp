@@ -71,7 +71,8 @@ TEST(CellScene, RefusesFlowAndStressWithoutACell) {
   parsed(boxed);
   for (const std::string flow :
        {"strain_rates = [-1, 0, 0]", "shear_rates = [1, 0, 0]", "stress = { xx = 1e3 }"})
-    refuse(replaced(boxed, "[[stage]]", "[[stage]]\n" + flow), "test.toml:10: stage", "stage 'stage-1'");
+    refuse(replaced(boxed, "[[stage]]", "[[stage]]\n" + flow), "test.toml:10: stage 'stage-1'",
+           "stage 'stage-1'");
 }
 
 TEST(CellScene, ReadsTheStressThatAStageFollowsAndWritesItAgain) {
@@ -101,13 +102,15 @@ TEST(CellScene, RefusesAStressThatTheCellCannotFollow) {
                   "[[wall]]\nname = \"z-\"\nside = \"z-\"\n[[wall]]\nname = \"z+\"\nside = "
                   "\"z+\"\n[sample]\nregion = { shape = "
                   "\"box\", low = [0, 0, 0], high = [0.1, 0.1, 0.1] }"),
-         "cell", "not periodic along z, so that nothing follows zz");
+         "stress.zz", "not periodic along z, so that nothing follows it");
   // The line is that of the stage's key, not that of [cell].
-  refuse(stage("stress = { zz = 1 }\nstrain_rates = [0, 0, -1]"), "test.toml:11", "stress.zz: has a rate");
-  refuse(stage("stress = { zz = 1, amplitude_xx = 2, period = 1 }"), "test.toml:11", "stress.amplitude_xx");
-  refuse(stage("stress = { zz = 1, amplitude_zz = 2 }"), "test.toml:11", "period");
-  refuse(stage("stress = { zz = 1, amplitude_zz = 2, period = 2e-4 }"), "test.toml:11",
-         "a quarter of the period");
+  refuse(stage("stress = { zz = 1 }\nstrain_rates = [0, 0, -1]"), "test.toml:11: stage 'stage-1': stress",
+         "stress.zz: has a rate");
+  refuse(stage("stress = { zz = 1, amplitude_xx = 2, period = 1 }"), "test.toml:11: stage 'stage-1': stress",
+         "stress.amplitude_xx");
+  refuse(stage("stress = { zz = 1, amplitude_zz = 2 }"), "test.toml:11: stage 'stage-1': stress", "period");
+  refuse(stage("stress = { zz = 1, amplitude_zz = 2, period = 2e-4 }"),
+         "test.toml:11: stage 'stage-1': stress.period", "a quarter of the period");
   refuse(stage("stress = { zx = 1 }"), "stage[0].stress.zx", "did you mean 'xz'?");
   refuse(stage("stress = { zz = 1 }") + "[decomposition]\ncoupling = \"alternating\"\n",
          "decomposition.coupling", "nscdd");

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <tuple>
 
 #include "kernels/bodies/index.hpp"
 #include "kernels/clusters/contact_matrix.hpp"
@@ -227,6 +228,62 @@ TEST(ClusterProblem, HasEachBodyAndContactOnce) {
   EXPECT_EQ(contacts, whole.contacts.size());
   EXPECT_EQ(walls, 1u);
   EXPECT_NEAR(mass, all, 1e-12 * all);
+}
+
+// Of a cluster that lies in two parts: each number that a direct solve asks for is another one.
+TEST(ClusterProblem, HasEveryNumberOfItsBodiesAndContactsWhereverTheyLie) {
+  double last = 0;
+  const auto next = [&] { return last += 0.5; };
+  const auto vector = [&] { return Vec3(next(), next(), next()); };
+  BodyProblem whole;
+  std::vector<Levers> levers(2);
+  for (int k = 0; k < 3; ++k) {
+    cluster_makers::add_grain(whole, Vec3::Zero(), 0.3);
+    BodyUnknown& body = whole.bodies.back();
+    for (double* number : {&body.mass, &body.spin_mass, &body.radius}) *number = next();
+    for (Vec3* number : {&body.x, &body.axis, &body.shears, &body.free.u, &body.free.w}) *number = vector();
+  }
+  for (std::int32_t k = 0; k < 2; ++k) {
+    cluster_makers::add_contact(whole, k, k + 1, vector(), next());
+    ContactEquation& c = whole.contacts.back();
+    for (Vec3* number : {&c.offset, &c.branch, &whole.impulse.back()}) *number = vector();
+    c.pull = next(), c.drive = next(), c.wall = 7 + k;
+    levers[at(k)].first = vector() * vector().transpose();
+    levers[at(k)].second = vector() * vector().transpose();
+    c.levers = &levers[at(k)];
+    whole.rolling.push_back({next(), vector(), vector()});
+  }
+  test::Cut cut(whole, {0, 1}, 2);
+  for (const std::size_t p : {0u, 1u}) cut.parts[p].rolling = {whole.rolling[p]};
+  std::vector<ContactGraph> graphs;
+  for (const BodyProblem& part : cut.parts) graphs.push_back(graph_of(part));
+  const std::vector<ClusterProblem> found =
+      cluster_problems(BodyParts(cut.parts, cut), clusters_of(graphs, cut));
+  ASSERT_EQ(found.size(), 1u);
+  const BodyProblem& made = found[0].problem;
+  ASSERT_EQ(made.bodies.size(), 3u);
+  ASSERT_EQ(made.contacts.size(), 2u);
+  for (std::size_t b = 0; b < 3; ++b) {
+    const BodyUnknown &is = made.bodies[b], &was = whole.bodies[b];
+    EXPECT_EQ(
+        std::tie(is.mass, is.spin_mass, is.radius, is.kind, is.x, is.axis, is.shears, is.free.u, is.free.w),
+        std::tie(was.mass, was.spin_mass, was.radius, was.kind, was.x, was.axis, was.shears, was.free.u,
+                 was.free.w))
+        << b;
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    const ContactEquation &is = made.contacts[k], &was = whole.contacts[k];
+    EXPECT_EQ(std::tie(is.mu, is.pull, is.drive, is.wall, is.cell, is.normal, is.branch, is.offset, is.first,
+                       is.second),
+              std::tie(was.mu, was.pull, was.drive, was.wall, was.cell, was.normal, was.branch, was.offset,
+                       was.first, was.second))
+        << k;
+    EXPECT_EQ(made.impulse[k], whole.impulse[k]);
+    EXPECT_EQ(std::tie(made.rolling[k].arm, made.rolling[k].spin, made.rolling[k].moment),
+              std::tie(whole.rolling[k].arm, whole.rolling[k].spin, whole.rolling[k].moment));
+    ASSERT_NE(is.levers, nullptr);
+    EXPECT_EQ(std::tie(is.levers->first, is.levers->second), std::tie(levers[k].first, levers[k].second));
+  }
 }
 
 TEST(ContactMatrix, GivesTheVelocitiesOfTheBodies) {

@@ -42,6 +42,22 @@ TEST(StepError, OfAWedgeIsThatOfItsImpulsesHoweverSharpItIs) {
     }
 }
 
+// A grain that friction holds between two walls: how hard they press it says nothing of how it moves.
+TEST(StepError, OfAGrainThatIsJammedIsThatOfWhatHoldsIt) {
+  constexpr double press = 1e5 * fall, part = 0.9;
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0.5);
+  for (const int side : {-1, 1}) {
+    add_contact(problem, grain, -1, side * Vec3::UnitX(), 0.5, side < 0 ? 0 : 1);
+    problem.impulse.back() = Vec3(side * press, 0, part * fall / 2);
+  }
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4}).velocity, (1 - part) / part, 1e-3) << "over what they do";
+  StepErrorThresholds coarse;
+  coarse.pressed = 1e-2;  // of both walls
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-6}, coarse).velocity, (1 - part) * fall / (1e-2 * 2 * press),
+              1e-8);
+}
+
 TEST(StepError, OfAColumnIsNotHiddenByGrainsAtRestBesideIt) {
   BodyProblem problem;
   add_column(problem, 50, 0, 0.7);

@@ -146,25 +146,35 @@ TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
   }
 }
 
-// Rates that are given close a cell whatever its grains bear.
+// Rates that are given close a cell whatever its grains bear, and one may begin too full.
 TEST(Runaway, OfACellThatIsLessThanItsGrainsHasNoRoom) {
-  talus::Setup setup;
-  setup.domain = periodic_domain({1, 1, 1});
-  setup.stages = {stage("close", 1)};
-  Bodies one;
-  add_sphere(one, BodyId{5}, Vec3(0.5, 0.5, 0.5), 0.01, density);
-  graph::Executor executor({.threads = 1});
-  Simulation simulation(setup, one, executor);
-  simulation.step();
-  SampleSize size;
-  const StepSums& sums = simulation.sums();
-  const StepOutcome outcome{
-      {1, "close"}, simulation.setup(),     size, simulation.parameters(), simulation.state(),
-      sums,         simulation.iterations()};
-  size.volume = 0.99;
-  EXPECT_NO_THROW(check_for_runaway(outcome, 0));
-  size.volume = 1.01;
-  EXPECT_THROW(check_for_runaway(outcome, 0), NoSpaceError);
+  for (const double rate : {0.0, -1e-3}) {
+    talus::Setup setup;
+    setup.domain = periodic_domain({1, 1, 1});
+    setup.stages = {stage("close", 1)};
+    setup.stages[0].strain_rates[2] = rate;
+    Bodies one;
+    add_sphere(one, BodyId{5}, Vec3(0.5, 0.5, 0.5), 0.01, density);
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(setup, one, executor);
+    simulation.step();
+    SampleSize size;
+    const StepSums& sums = simulation.sums();
+    const StepOutcome outcome{
+        {1, "close"}, simulation.setup(),     size, simulation.parameters(), simulation.state(),
+        sums,         simulation.iterations()};
+    size.volume = 0.99;
+    EXPECT_NO_THROW(check_for_runaway(outcome, 0));
+    size.volume = 1.01;
+    try {
+      check_for_runaway(outcome, 0);
+      FAIL() << "went on";
+    } catch (const NoSpaceError& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find(rate == 0 ? "make it larger" : "End the stage sooner"), std::string::npos)
+          << message;
+    }
+  }
 }
 
 /// Of three balls that touch above a floor, two fall at 1 cm/s and the third waits: behind the impact
