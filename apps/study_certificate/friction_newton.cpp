@@ -17,8 +17,9 @@ constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
 constexpr int inner_steps = 40, halvings = 4;
 /// Part of the law's residual to which a problem around a centre is solved.
 constexpr double inner_part = 1e-2;
-/// Least momentum exchanged, kinetic norm, over the largest impulse.
-constexpr double floor_of_exchange = 1e-2;
+/// Least momentum exchanged, kinetic norm, over the largest impulse: as little as errors are judged by
+/// (ErrorUnits::walls), as friction may press by far more than all that moves.
+constexpr double floor_of_exchange = 1e-8;
 /// Of a system with a cell, solved by parts: so many refinements at most, until so much of its right side is
 /// left.
 constexpr int refinements = 4;
