@@ -34,24 +34,35 @@ constexpr double slack_of_law = 1e-2, slack_of_velocities = 1e-1;
 /// column, no grain gets out of by itself.
 constexpr double narrowest = 1000, farthest_out = 40;
 
+/// Where a contact has its grain, as a side of a wedge.
+struct Side {
+  double sign = 0;        ///< of the normal that points into the grain; 0: it is no side of that grain
+  bool overlaps = false;  ///< else what is granted reaches it
+};
+
+Side side_of(const StepProblem& problem, const StepContact& contact, std::size_t grain, double granted) {
+  if (contact.is_moment() || contact.bias * problem.time_step > granted) return {};
+  if (contact.first == grain) return {1, contact.bias <= 0};
+  return {!contact.at_wall() && contact.other() == grain ? -1.0 : 0.0, contact.bias <= 0};
+}
+
 /// How far a grain may have to go for each overlap that is undone: two sides whose normals are an angle a
-/// apart let go by 1 as it moves by 1/cos(a/2).
-double way_out(const StepProblem& problem) {
+/// apart let go by 1 as it moves by 1/cos(a/2). One side may be open at first, by no more than `granted` [m],
+/// which a grain between walls that are far apart may go.
+double way_out(const StepProblem& problem, double granted) {
   double most = 1;
   const auto& contacts = problem.contacts;
-  const auto on = [](const StepContact& contact, std::size_t grain) -> double {
-    if (contact.is_moment() || contact.bias > 0) return 0;
-    if (contact.first == grain) return 1;
-    return !contact.at_wall() && contact.other() == grain ? -1 : 0;
-  };
   for (std::size_t c = 0; c < contacts.size(); ++c)
     for (std::size_t d = 0; d < c; ++d)
-      for (const std::size_t grain : {contacts[c].first, contacts[d].first})
-        if (const double both = on(contacts[c], grain) * on(contacts[d], grain); both != 0) {
-          const double half =
-              std::sqrt(std::max(0.0, (1 + both * contacts[c].normal.dot(contacts[d].normal)) / 2));
-          if (half * narrowest >= 1) most = std::max(most, std::min(1 / half, farthest_out));
-        }
+      for (const std::size_t grain : {contacts[c].first, contacts[d].first}) {
+        const Side one = side_of(problem, contacts[c], grain, granted);
+        const Side other = side_of(problem, contacts[d], grain, granted);
+        const double both = one.sign * other.sign;
+        if (both == 0 || !(one.overlaps || other.overlaps)) continue;
+        const double half =
+            std::sqrt(std::max(0.0, (1 + both * contacts[c].normal.dot(contacts[d].normal)) / 2));
+        if (half * narrowest >= 1) most = std::max(most, std::min(1 / half, farthest_out));
+      }
   return most;
 }
 
@@ -101,9 +112,10 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
                            step.unexplained);
     return;
   }
-  if (!(step.shift <= 1) && !(step.shift <= way_out(problem))) {
+  if (!step.shift.within(1) && !step.shift.within(way_out(problem, step.shift.granted))) {
     step.judged = Judged::other_problem;
-    step.why = fmt::format("a grain is {:.1e} times as far as velocities and overlaps take it", step.shift);
+    step.why = fmt::format("a grain is {:.1e} times as far as velocities and overlaps take it",
+                           step.shift.way / step.shift.granted);
     return;
   }
   ReferenceLimits own = limits;

@@ -34,7 +34,7 @@ struct AuditedStep {
   Judged judged = Judged::no_reference;
   std::string why;           ///< where it is not judged
   double unexplained = 0;    ///< disagreement() of the run with the problem
-  double shift = 0;          ///< unexplained_shift(): beyond 1 it is another problem
+  UnexplainedShift shift;    ///< of the run beside the problem
   bool forces_known = true;  ///< where judged; else forces are over-determined, velocities are not
   TrueErrors errors;
   double residual = 0, uncertainty = 0;  ///< of the reference

@@ -355,17 +355,17 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;
 }
 
-double unexplained_shift(const StepInput& input, double part, const Frame& after) {
-  if (input.before.domain.repeats) return 0;
+UnexplainedShift unexplained_shift(const StepInput& input, double part, const Frame& after) {
+  if (input.before.domain.repeats) return {};
   const Frame& before = input.before;
   const double h = input.stage.time_step;
   const std::size_t grains = after.x.size();
   std::vector<Vec3> middle, moved;
-  double shift = 0, size = 0, largest = 0, overlaps = 0;
+  double way = 0, size = 0, largest = 0, overlaps = 0;
   for (std::size_t k = 0; k < grains; ++k) {
     middle.push_back(before.x[k] + h / 2 * before.u[k]);
     moved.push_back(middle[k] + h / 2 * after.u[k]);
-    shift = larger(shift, (after.x[k] - moved[k]).norm());
+    way = larger(way, (after.x[k] - moved[k]).norm());
     largest = std::max(largest, after.radius[k]);
     size = std::max(size, after.x[k].norm() + (moved[k] - before.x[k]).norm());
   }
@@ -386,7 +386,7 @@ double unexplained_shift(const StepInput& input, double part, const Frame& after
       overlaps += std::max(wall.overlap(middle[i], after.radius[i], half),
                            wall.overlap(moved[i], after.radius[i], end));
   }
-  return shift / (part * (floors.undone * overlaps + floors.corrected * largest) + floors.place * size);
+  return {way, part * (floors.undone * overlaps + floors.corrected * largest) + floors.place * size};
 }
 
 }  // namespace talus::audit

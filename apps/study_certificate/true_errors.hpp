@@ -79,10 +79,16 @@ double disagreement(const StepProblem& problem, const StepEnd& end);
 /// `overlap_correction` shifts sets nothing in motion and does not count.
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
 
-/// Largest way of a grain that its velocities do not explain, |x+ - x- - h (u- + u+)/2|, over what may shift
-/// it: `part` (`overlap_correction`) of the overlaps in the middle of the step, from where grains rebound, or
-/// that the velocities would leave at its end, twice their sum, and rounding. 0 in a cell, where positions
-/// wrap. `input`: the step without what happens in it.
-double unexplained_shift(const StepInput& input, double part, const Frame& after);
+/// How far a grain is from where its velocities take it, and what may shift it that far.
+struct UnexplainedShift {
+  double way = 0;      ///< the largest |x+ - x- - h (u- + u+)/2| [m]
+  double granted = 0;  ///< [m]
+  bool within(double times) const { return way <= times * granted; }  ///< false also where it is no number
+};
+
+/// Granted are `part` (`overlap_correction`) of the overlaps in the middle of the step, from where grains
+/// rebound, or that the velocities would leave at its end, twice their sum, and rounding. Nothing is asked in
+/// a cell, where positions wrap. `input`: the step without what happens in it.
+UnexplainedShift unexplained_shift(const StepInput& input, double part, const Frame& after);
 
 }  // namespace talus::audit

@@ -225,20 +225,20 @@ TEST(CertificateAudit, AsksWhetherGrainsAreWhereTheirVelocitiesAndOverlapsTakeTh
   const Bodies bodies;
   const talus::Setup setup;
   const StepInput input{before, {}, {}, stage, bodies, setup};
-  const auto shift = [&](double given) { return unexplained_shift(input, given, after); };
-  EXPECT_LT(shift(0), 1);
+  const auto explained = [&](double given) { return unexplained_shift(input, given, after).within(1); };
+  EXPECT_TRUE(explained(0));
   after.x[1][0] += part * overlap;
-  EXPECT_LT(shift(part), 1) << "that is what overlap_correction is for";
-  EXPECT_GT(shift(0), 1) << "nobody has asked for it";
+  EXPECT_TRUE(explained(part)) << "that is what overlap_correction is for";
+  EXPECT_FALSE(explained(0)) << "nobody has asked for it";
   after.x[1][0] += overlap;
-  EXPECT_GT(shift(part), 1) << "more than is undone in a step";
+  EXPECT_FALSE(explained(part)) << "more than is undone in a step";
   // Where nothing overlaps, the rest of a solve that has ended: a hundred millionth of a radius.
   before.x[1][0] += radius;
   after.x[1] = before.x[1] + h * before.u[1];
   after.x[1][0] += part * 9e-9 * radius;
-  EXPECT_LT(shift(part), 1);
+  EXPECT_TRUE(explained(part));
   after.x[1][0] += radius * 1e-6;
-  EXPECT_GT(shift(part), 1);
+  EXPECT_FALSE(explained(part));
 }
 
 // With `overlap_correction` a grain before a paddle was once shifted by the paddle's velocity as if that were
@@ -259,9 +259,9 @@ TEST(CertificateWalls, AGrainBeforeAPaddleIsWhereItsVelocityTakesItAndNotBehindT
   after.walls.resize(1);
   after.u = answer.motion.u;
   after.x[0] += h / 2 * after.u[0];
-  EXPECT_LT(unexplained_shift(step.input(), 0.1, after), 1);
+  EXPECT_TRUE(unexplained_shift(step.input(), 0.1, after).within(1));
   after.x[0] -= 0.1 * problem.contacts[0].drift;
-  EXPECT_GT(unexplained_shift(step.input(), 0.1, after), 1);
+  EXPECT_FALSE(unexplained_shift(step.input(), 0.1, after).within(1));
 }
 
 /// Runs a scene and expects of its audit that the problems are those of the run, and the errors within twice
