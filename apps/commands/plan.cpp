@@ -101,7 +101,7 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
 
 void print_costs(const Simulation& simulation) {
   const StepState& state = simulation.state();
-  const auto bodies = static_cast<double>(std::max<std::size_t>(state.bodies.size(), 1));
+  const auto grains = static_cast<double>(std::max<std::int64_t>(simulation.bodies(), 1));
   const auto candidates = static_cast<double>(std::max<std::size_t>(state.candidates.size(), 1));
   const auto contacts = static_cast<double>(std::max<std::int64_t>(simulation.report().contacts, 1));
   const double of_bodies = static_cast<double>(
@@ -109,10 +109,12 @@ void print_costs(const Simulation& simulation) {
       (state.single.velocity.capacity() + state.single.last_v.capacity()) * sizeof(SingleVelocity) +
       state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * 8);
   const double of_contacts = static_cast<double>(memory_used(state)) - of_bodies;
-  print_out("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(),
+  const auto copies = static_cast<std::int64_t>(state.bodies.size()) - simulation.bodies();
+  print_out("\n  {} grains{}, {} candidates, {} contacts in {} chunks of {} colours\n", simulation.bodies(),
+            copies > 0 ? fmt::format(" and {} copies of them in other subdomains", copies) : "",
             state.candidates.size(), simulation.report().contacts, state.chunks.size(), state.chunks.colours);
   print_out("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.3g} MB in all\n",
-            of_bodies / bodies, of_contacts / candidates, of_contacts / contacts,
+            of_bodies / grains, of_contacts / candidates, of_contacts / contacts,
             static_cast<double>(memory_used(state)) / 1e6);
   print_out("  {} tasks per sweep ({:.4f} per contact), {} tasks per step outside the sweeps\n",
             state.chunks.size(), static_cast<double>(state.chunks.size()) / contacts,

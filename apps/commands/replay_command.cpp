@@ -110,8 +110,10 @@ int replay_command(ReplayOptions options) {
     const std::string& file = options.smpi_platform;
     io::check_output_files({options.file}, {options.out, file, file.empty() ? "" : file + ".hosts"},
                            options.force);
-    if (options.steps && !(*options.steps >= 1))
-      throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    constexpr double most_steps = 1e15;
+    if (options.steps && !(*options.steps >= 1 && *options.steps <= most_steps))
+      throw std::invalid_argument(
+          fmt::format("--steps must be 1 to {:g}, got {}", most_steps, *options.steps));
     const trace::Trace recorded = io::read_trace(options.file);
     machine.ranks = options.ranks.value_or(recorded.ranks);
     machine.threads = options.threads.value_or(recorded.threads);

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
 #include "apps/shared/run_json_files.hpp"
+#include "io/files/error.hpp"
 
 namespace talus {
 
@@ -25,6 +27,20 @@ namespace {
 std::string resolved_text(const std::filesystem::path& directory) {
   std::ifstream file(directory / "scene.resolved.toml", std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// A run that has ended knows how many steps it has had; one that failed may not have told its last ones.
+void demand_all_steps(const RunFolder& run) {
+  const std::string status = run.summary.value("status", "running");
+  const auto told = run.summary.value("steps", std::int64_t{0});
+  const auto rows = std::ssize(run.steps["converged"]);
+  if (status == "running" || rows == told || (status == "failed" && rows > told)) return;
+  throw io::FileError(
+      (run.directory / "steps.csv").string(),
+      fmt::format("has {} whole rows with column `converged`, run.json beside it speaks of {} "
+                  "steps: restore the one that has been changed, or run the scene anew in "
+                  "another directory",
+                  rows, told));
 }
 
 }  // namespace
@@ -69,6 +85,7 @@ RunFolder read_run_folder(const std::filesystem::path& directory) {
       directory / "steps.csv",
       {"step", "time", "time_step", "contacts", "active", "iterations", "error_rms", "error_max", "balance",
        "velocity_error", "overlap", "kinetic_translation", "kinetic_rotation", "wall_s", "converged"});
+  demand_all_steps(run);
   return run;
 }
 

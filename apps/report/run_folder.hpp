@@ -36,7 +36,7 @@ std::string damage_of_frames(const std::filesystem::path& directory);
 std::optional<io::Scene> resolved_scene(const std::filesystem::path& directory);
 
 /// Throws std::invalid_argument where no run was begun, io::FileError where run.json or a table is not as
-/// Talus wrote it.
+/// Talus wrote it, or the run has ended with other steps than steps.csv has.
 RunFolder read_run_folder(const std::filesystem::path& directory);
 
 }  // namespace talus

@@ -11,6 +11,7 @@
 
 #include "io/checkpoint/checkpoint_file.hpp"
 #include "io/checkpoint/checkpoint_folder.hpp"
+#include "io/files/error.hpp"
 #include "io/results/results.hpp"
 #include "runtime/step/cell_flow.hpp"
 
@@ -186,7 +187,12 @@ StateSample read_state(const io::Scene& scene) {
   const std::string name = std::filesystem::path(scene.samples.front().file).filename().string();
   const bool checkpoint = io::is_checkpoint_name(name);
   if (checkpoint && scene.samples.front().frame) refuse("a checkpoint has no frames: leave `frame` out");
-  StateSample state = checkpoint ? state_of_checkpoint(scene) : state_of_frame(scene);
+  StateSample state;
+  try {
+    state = checkpoint ? state_of_checkpoint(scene) : state_of_frame(scene);
+  } catch (const io::FileError& error) {
+    refuse(error.what());
+  }
   if (!scene.setup.clumps.empty() || state.clumps)
     refuse("states of clumps cannot be begun from: begin with the sample that the run began with");
   if (!same_cell(state.domain, scene.setup.domain))

@@ -121,6 +121,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   ReferenceLimits own = limits;
   own.forces = slack_of_law * step.asked;
   own.forces_velocities = slack_of_velocities * step.asked;
+  own.own_velocities = step.asked;
   const Reference reference = solve_reference(problem, run.r, own);
   step.residual = reference.residual;
   step.uncertainty = reference.uncertainty();

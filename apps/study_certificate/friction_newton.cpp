@@ -250,6 +250,11 @@ bool FrictionNewton::solve_near(const Vector& centre, double shift, double enoug
   return now <= enough;
 }
 
+double FrictionNewton::residual(std::span<const Vec3> r, double unit) const {
+  const Vector s = scaled(r);
+  return law(s, s, 0).cwiseAbs().maxCoeff() / unit;
+}
+
 NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) const {
   Vector s = scaled(r);
   NewtonResult result;
@@ -272,9 +277,8 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) con
   }
   Vector ds;
   if (step(s, law(s, s, 0), {s, least_shift}, ds)) {
-    result.exchanged =
-        std::max(std::sqrt(std::max(0.0, s.dot(times_w(s)))), floor_of_exchange * s.cwiseAbs().maxCoeff());
-    result.next = std::sqrt(std::max(0.0, ds.dot(times_w(ds))));
+    result.exchanged = std::max(moves(s), floor_of_exchange * s.cwiseAbs().maxCoeff());
+    result.next = moves(ds);
   }
   r = unscaled(s);
   return result;
@@ -295,8 +299,7 @@ bool FrictionNewton::go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r,
 }
 
 double FrictionNewton::apart(std::span<const Vec3> a, std::span<const Vec3> b) const {
-  const Vector s = scaled(a) - scaled(b);
-  return std::sqrt(std::max(0.0, s.dot(times_w(s))));
+  return moves(scaled(a) - scaled(b));
 }
 
 }  // namespace talus::audit

@@ -4,6 +4,7 @@
 
 #include <Eigen/SparseCore>
 
+#include <cmath>
 #include <memory>
 #include <span>
 #include <vector>
@@ -35,6 +36,8 @@ class FrictionNewton {
 
   /// What residuals are compared with: the largest of the impulses r, or speed of approach, scaled.
   double unit(std::span<const Vec3> r) const;
+  /// Of the law at r, the largest entry over `unit`.
+  double residual(std::span<const Vec3> r, double unit) const;
   /// Proximal steps from r, in and out, until the residual over `unit` is `enough`, at most `most`.
   struct Goal {
     double unit, enough;
@@ -66,6 +69,11 @@ class FrictionNewton {
   };
 
   Vector times_w(const Vector& s) const { return W_ * s + cell_ * (cell_.transpose() * s); }
+  /// (s.W s)^1/2, the kinetic norm of what impulses s change. The product itself may be rounding, and even
+  /// negative, where impulses press against one another by far more than they move.
+  double moves(const Vector& s) const {
+    return std::hypot((momenta_.transpose() * s).norm(), (cell_.transpose() * s).norm());
+  }
   Vector scaled(std::span<const Vec3> r) const;
   std::vector<Vec3> unscaled(const Vector& s) const;
   Vector law(const Vector& s, const Vector& centre, double shift) const;

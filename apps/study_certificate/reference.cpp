@@ -36,6 +36,7 @@ std::vector<Part> split(const StepProblem& whole, std::span<const Vec3> run) {
   for (Part& part : parts) {
     part.problem.time_step = whole.time_step;
     part.problem.gravity = whole.gravity;
+    part.problem.rounding_speed = whole.rounding_speed;
     part.problem.free.walls = whole.free.walls;
     part.problem.wall_normal = whole.wall_normal;
     part.problem.wall_inv_mass = whole.wall_inv_mass;

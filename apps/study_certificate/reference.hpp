@@ -26,6 +26,8 @@ struct ReferenceLimits {
   /// compared with the nearest impulses that meet the law to this residual and whose velocities are exact to
   /// that part of what the impulses change, in the kinetic norm: the answer to gaps that differ so little.
   double forces = 1e-5, forces_velocities = 1e-5;
+  double own_velocities = 1e-4;  ///< the second of the run's own impulses, if they meet the law to
+                                 ///< `residual`: its velocities are judged by themselves
   double motion = 1e-9;     ///< least exchange, over what all bodies have, kinetic norm: below it is rounding
   double speeds = 1e-4;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step

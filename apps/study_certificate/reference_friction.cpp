@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <numeric>
 
 #include "apps/study_certificate/friction_newton.hpp"
 #include "apps/study_certificate/reference.hpp"
@@ -206,38 +207,46 @@ double accelerate(Sweeps& sweeps, Vector& r, std::int64_t most, double enough) {
 /// Forces next to the run's (ReferenceLimits::forces).
 class Forces {
  public:
-  Forces(const FrictionNewton& newton, std::span<const Vec3> run, double unit, const ReferenceLimits& limits)
-      : newton_(newton), run_(run), unit_(unit), limits_(limits) {}
+  /// `rounding`: what it makes of velocities that are no error, in the kinetic norm [J^1/2].
+  Forces(const FrictionNewton& newton, std::span<const Vec3> run, double unit, double rounding,
+         const ReferenceLimits& limits)
+      : newton_(newton), run_(run), unit_(unit), rounding_(rounding), limits_(limits) {}
 
-  /// By proximal steps. A heavy body on light ones moves by what the law's residual hardly shows, and no
-  /// proximal step that holds redundant contacts lets it follow: there those forces that keep the exact
-  /// velocities.
+  /// The run's own where they are among those; else by proximal steps. A heavy body on light ones moves by
+  /// what the law's residual hardly shows, and no proximal step that holds redundant contacts lets it follow:
+  /// there those forces that keep the exact velocities.
   bool take(Reference& reference) const {
+    if (newton_.residual(run_, unit_) <= limits_.residual && known(run_, reference, limits_.own_velocities)) {
+      reference.r.assign(run_.begin(), run_.end());
+      return true;
+    }
     for (double enough = limits_.forces; enough >= limits_.residual; enough /= 10) {
       std::vector<Vec3> r;
       if (!newton_.go_next_to(run_, r, unit_, enough)) break;
-      if (!known(r, reference)) continue;
+      if (!known(r, reference, limits_.forces_velocities)) continue;
       reference.r = r;
       return true;
     }
     const FrictionNewton::Room room{limits_.forces, unit_,
                                     limits_.forces_velocities * reference.exchanged + reference.error};
     std::vector<Vec3> r;
-    if (!newton_.keep_velocities(run_, reference.exact, room, r) || !known(r, reference)) return false;
+    if (!newton_.keep_velocities(run_, reference.exact, room, r) ||
+        !known(r, reference, limits_.forces_velocities))
+      return false;
     reference.r = r;
     return true;
   }
 
  private:
-  /// The exact velocities are known but for what a next step of Newton's method would change.
-  bool known(std::span<const Vec3> r, const Reference& reference) const {
-    return newton_.apart(r, reference.exact) <=
-           limits_.forces_velocities * reference.exchanged + reference.error;
+  /// The exact velocities are known but for `part` of what is exchanged, what a next step of Newton's method
+  /// would change, and rounding.
+  bool known(std::span<const Vec3> r, const Reference& reference, double part) const {
+    return newton_.apart(r, reference.exact) <= part * reference.exchanged + reference.error + rounding_;
   }
 
   const FrictionNewton& newton_;
   std::span<const Vec3> run_;
-  double unit_;
+  double unit_, rounding_;
   const ReferenceLimits& limits_;
 };
 
@@ -253,7 +262,9 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   const FrictionNewton::Goal goal{newton.unit(run), sharpness * limits.residual, limits.proximal_steps,
                                   limits.pumped};
   const std::size_t contacts = sweeps.contacts();
-  const Forces forces(newton, run, goal.unit, limits);
+  const double mass = std::accumulate(problem.mass.begin(), problem.mass.end(), 0.0);
+  const Forces forces(newton, run, goal.unit, excused_roundings * problem.rounding_speed * std::sqrt(mass),
+                      limits);
   Vector r = joined(run);
   // Newton's method begins at the run's own impulses: where several answers stand side by side sweeps may
   // walk from one to another. It ends quickly where the right contacts slide, stick and are open; sweeps find

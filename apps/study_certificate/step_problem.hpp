@@ -57,6 +57,9 @@ struct Motion {
   CellVector cell = CellVector::Zero();
 };
 
+/// So many speeds that rounding of a position makes (StepProblem::rounding_speed) are no error of a velocity.
+constexpr double excused_roundings = 5;
+
 /// n grains in the order of the frame, k walls (of which planes move along their normals where pushed).
 struct StepProblem {
   double time_step = 0;               ///< loads act so long on the velocities that are found: h/(1 + E) [s]

@@ -20,7 +20,6 @@ struct Floors {
   double contact = 1e-3;    ///< likewise: least contact impulse
   double load = 1e-2;       ///< of a cluster's weight in a step: least momentum it exchanges
   double cluster = 1e-9;    ///< of a cluster's own momentum, likewise: grains that graze one another
-  double rounding = 5;      ///< speeds that rounding of a position makes
   double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
   double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
   double corrected = 1e-7;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
@@ -91,7 +90,7 @@ std::vector<double> roundings(const StepProblem& problem) {
   for (const std::size_t k : of_grain) ++grains[k];
   grains[count] = 0;  // those that touch nothing
   for (const std::size_t k : of_grain)
-    times.push_back(floors.rounding * std::max(1.0, std::sqrt(grains[k] / floors.row)));
+    times.push_back(excused_roundings * std::max(1.0, std::sqrt(grains[k] / floors.row)));
   return times;
 }
 
@@ -202,7 +201,7 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
   for (const double inverse : problem.wall_inv_mass)
     if (inverse > 0) weigh(1 / inverse);
   for (const Vec3& r : reference.r) most = std::max(most, r.norm());
-  const bool matters = floors.rounding * all * problem.rounding_speed > claimed * most;
+  const bool matters = excused_roundings * all * problem.rounding_speed > claimed * most;
   if (heaviest <= units.lopsided * lightest || !matters) return felt;
   const std::vector<Vec3> walls = wall_impulses(problem, reference.exact, false);
   std::vector<double> at_contact(reference.exact.size(), 0.0), at_wall(walls.size(), 0.0);
@@ -213,15 +212,15 @@ FeltRounding felt_rounding(const StepProblem& problem, const Reference& referenc
   for (const auto& sign : signs) {
     StepProblem other = problem;
     for (std::size_t c = 0; c < other.contacts.size(); ++c)
-      other.contacts[c].bias += sign[c % 2] * floors.rounding * problem.rounding_speed;
+      other.contacts[c].bias += sign[c % 2] * excused_roundings * problem.rounding_speed;
     const Reference changed = solve_reference(other, reference.exact, limits);
     if (changed.found != Found::answer) continue;
     any = true;
     for (std::size_t c = 0; c < at_contact.size(); ++c)
-      at_contact[c] = std::max(at_contact[c], (changed.r[c] - reference.exact[c]).norm() / floors.rounding);
+      at_contact[c] = std::max(at_contact[c], (changed.r[c] - reference.exact[c]).norm() / excused_roundings);
     const std::vector<Vec3> pressed = wall_impulses(other, changed.r, false);
     for (std::size_t w = 0; w < walls.size(); ++w)
-      at_wall[w] = std::max(at_wall[w], (pressed[w] - walls[w]).norm() / floors.rounding);
+      at_wall[w] = std::max(at_wall[w], (pressed[w] - walls[w]).norm() / excused_roundings);
   }
   if (!any) return felt;
   // Of light grains all counts, as where there are no others: a row passes on what it makes of each.
@@ -250,7 +249,7 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     felt = std::max({felt, walls[w].norm(), h * std::abs(problem.wall_load[w])});
     const double error = (walls[w] - h * end.after.walls[w].force).norm();
     wall_wrong = std::max(wall_wrong,
-                          beyond_rounding(problem, resting[w], error, floors.rounding, felt_at.of_wall(w)));
+                          beyond_rounding(problem, resting[w], error, excused_roundings, felt_at.of_wall(w)));
   }
   const Mat3 faces = face_impulses(problem, reference.r), wrong = faces - face_impulses(problem, end.r);
   const double load = h * problem.cell.load.cwiseAbs().maxCoeff();
@@ -270,8 +269,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
     if (problem.contacts[c].is_moment()) continue;
     contact_unit = std::max(contact_unit, reference.r[c].norm());
     const double error = (reference.r[c] - end.r[c]).norm();
-    contact_wrong = std::max(
-        contact_wrong, beyond_rounding(problem, together[c], error, floors.rounding, felt_at.of_contact(c)));
+    contact_wrong = std::max(contact_wrong, beyond_rounding(problem, together[c], error, excused_roundings,
+                                                            felt_at.of_contact(c)));
   }
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);
@@ -333,8 +332,9 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
     if (problem.wall_inv_mass[w] > 0) return 0;
   if (problem.drive_speed > 0 || problem.walls_move || problem.cell.repeats) return 0;
   if (std::ranges::any_of(problem.contacts, [](const StepContact& one) { return one.pull > 0; })) return 0;
-  double gained = 0, free = 0, fall = 0;
+  double gained = 0, free = 0, fall = 0, mass = 0, wall_impulse = 0;
   const double h = problem.time_step * (1 + problem.reflection);
+  for (const WallReport& wall : after.walls) wall_impulse = std::max(wall_impulse, h * wall.force.norm());
   const auto turning = [&](const Frame& frame, std::size_t k) {
     if (frame.omega.empty()) return 0.0;
     if (problem.clumps.empty())
@@ -351,7 +351,9 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
               m * problem.gravity.dot(moved) + turning(after, k) - turning(before, k);
     free += 0.5 * m * problem.free.u[k].squaredNorm() + turning(before, k);
     fall += m * (h * problem.gravity).squaredNorm() / 8;
+    mass += m;
   }
+  free += std::pow(units.walls * wall_impulse, 2) / (2 * mass);
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;
 }
 

@@ -75,8 +75,9 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
 double disagreement(const StepProblem& problem, const StepEnd& end);
 
 /// Energy that a step gained beyond the share that the scheme itself may add, m (h g)^2/8 a grain
-/// (docs/theory.md), over its kinetic energy without contacts. Heights change by the motion: what
-/// `overlap_correction` shifts sets nothing in motion and does not count.
+/// (docs/theory.md), over its kinetic energy without contacts and that of the momentum which V is compared
+/// with at least (ErrorUnits::walls). Heights change by the motion: what `overlap_correction` shifts sets
+/// nothing in motion and does not count.
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
 
 /// How far a grain is from where its velocities take it, and what may shift it that far.

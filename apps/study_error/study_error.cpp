@@ -56,7 +56,7 @@ StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   plan.tolerances = descending(options.tolerances, {1e-2, 1e-3, 1e-4});
   plan.time_steps = descending(options.time_steps, {1});
   plan.at_step = options.at_step;
-  plan.steps = options.steps;
+  plan.steps = options.steps.value_or(20);
   plan.max_sweeps = options.max_sweeps;
   plan.max_seconds = options.max_seconds;
   const std::vector<std::string> methods = or_else(options.methods, talus::methods().names());
@@ -69,8 +69,9 @@ StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   return plan;
 }
 
-/// What a run of the scene would find out late. Throws std::invalid_argument.
-void check_lengths(const io::Scene& scene, const StudyPlan& plan, const std::string& only) {
+/// What a run of the scene would find out late; `steps`: those asked for. Throws std::invalid_argument.
+void check_lengths(const io::Scene& scene, const StudyPlan& plan, const std::string& only,
+                   std::optional<std::int64_t> steps) {
   const double last = most_steps(scene.setup.stages);
   if (only != "run" && static_cast<double>(plan.at_step) >= last)
     throw std::invalid_argument(
@@ -78,6 +79,11 @@ void check_lengths(const io::Scene& scene, const StudyPlan& plan, const std::str
                     "smaller one",
                     plan.at_step, scene.source_file, last));
   if (only == "step") return;
+  if (steps && static_cast<double>(*steps) > length_in_first_steps(scene.setup.stages))
+    throw std::invalid_argument(fmt::format(
+        "--steps {}: {} is over after {:g} time steps of its first stage; choose no more, or --set an end of "
+        "its stages",
+        *steps, scene.source_file, length_in_first_steps(scene.setup.stages)));
   for (const double time_step : plan.time_steps)
     if (const std::string why = why_no_step(scene, plan, time_step); !why.empty())
       throw std::invalid_argument(why);
@@ -91,7 +97,7 @@ int study_scene(const StudyErrorOptions& options) {
   try {
     const io::Scene scene = io::load_scene(options.subject, options.overrides);
     plan = plan_of(options, scene.setup.seed);
-    check_lengths(scene, plan, options.only);
+    check_lengths(scene, plan, options.only, options.steps);
     for (const StudyVariant& variant : plan.variants)
       if (samples.empty() || samples.back().scene.setup.seed != variant.seed)
         samples.push_back(study_sample(options.subject, options.overrides, variant.seed));
@@ -231,9 +237,8 @@ void add_study_error_options(CLI::App& app, StudyErrorOptions& options) {
       ->type_name("N")
       ->capture_default_str()
       ->check(not_negative());
-  app.add_option("--steps", options.steps, "length of a whole run, in time steps of the first stage")
+  app.add_option("--steps", options.steps, "length of a whole run, in time steps of the first stage [20]")
       ->type_name("N")
-      ->capture_default_str()
       ->check(above_zero());
   app.add_option("--max-sweeps", options.max_sweeps, "of a solve of the one step")
       ->type_name("N")

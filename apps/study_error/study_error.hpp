@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ struct StudyErrorOptions {
   std::vector<std::uint64_t> seeds;    ///< [the scene's]
   std::string only;                    ///< "step", "run" or "" for both
   std::int64_t at_step = 10;           ///< steps before the one that is solved again and again
-  std::int64_t steps = 20;             ///< of a whole run
+  std::optional<std::int64_t> steps;   ///< of a whole run; 20, or all that the scene has
   int max_sweeps = 5000;               ///< of a solve of the one step
   double max_seconds = 60;             ///< of a solve
 };

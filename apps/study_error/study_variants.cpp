@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "apps/shared/placed_sample.hpp"
@@ -33,6 +34,12 @@ double most_steps(std::span<const Stage> stages) {
     sum += steps;
   }
   return sum;
+}
+
+double length_in_first_steps(std::span<const Stage> stages) {
+  double sum = 0;
+  for (const Stage& stage : stages) sum += most_steps({&stage, 1}) * stage.time_step;
+  return std::round(sum / stages.front().time_step);
 }
 
 std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> all) {

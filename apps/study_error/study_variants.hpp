@@ -47,6 +47,9 @@ SolverSettings at_tolerance(SolverSettings solver, double tolerance);
 /// equilibrium alone.
 double most_steps(std::span<const Stage> stages);
 
+/// The time after which they have ended at the latest, in time steps of the first.
+double length_in_first_steps(std::span<const Stage> stages);
+
 /// "nlgs, 12 subdomains, 2 threads, seed 1"; of the last three only those in which `all` differ.
 std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> all);
 

@@ -20,6 +20,9 @@ using detail::CsvPlace, detail::number_in, detail::split, detail::trimmed;
 constexpr std::array<std::string_view, 11> columns = {"id", "x",  "y",  "z",  "radius", "vx",
                                                       "vy", "vz", "wx", "wy", "wz"};
 
+/// Ids of grains that come later, and of the balls of clumps in other formats, are larger.
+constexpr std::int64_t largest_id = 1'000'000'000'000'000;
+
 /// Fields of a line, at most one more than there can be: enough to see that there are too many.
 using Fields = std::array<std::string_view, columns.size() + 2>;
 
@@ -80,7 +83,7 @@ Sample read_bodies(const std::string& path, double density, bool rotates,
                  fmt::format("{} fields expected as in the header, got {}{}", header.count(),
                              found > header.count() ? "more than " : "", std::min(found, header.count())));
     const auto id = number_in<std::int64_t>(fields[0], columns[0], place);
-    if (id < 0) place.fail("id", fmt::format("must be >= 0, got {}", id));
+    if (id < 0 || id > largest_id) place.fail("id", fmt::format("must be 0 to {}, got {}", largest_id, id));
     if (const auto [first, inserted] = line_of_id.emplace(id, place.line); !inserted)
       place.fail("id", fmt::format("{} stands already on line {}", id, first->second));
     std::array<double, columns.size()> value{};

@@ -21,14 +21,21 @@ std::ptrdiff_t bodies_of(const BodyProblem& problem) {
   return std::ssize(problem.bodies) - (problem.has_cell() ? 1 : 0);
 }
 
-/// Loops that pairs of bodies close which have contacts, in a cluster.
+/// Loops that pairs of bodies close which have contacts, in a cluster, and contacts with walls that are none
+/// of its bodies: all those walls together are one body more.
 std::ptrdiff_t loops_of(const BodyProblem& problem) {
   std::vector<std::array<std::int32_t, 2>> pairs;
-  for (const ContactEquation& c : problem.contacts)
-    if (c.second >= 0) pairs.push_back({std::min(c.first, c.second), std::max(c.first, c.second)});
+  std::ptrdiff_t grounded = 0;
+  for (const ContactEquation& c : problem.contacts) {
+    if (c.second >= 0)
+      pairs.push_back({std::min(c.first, c.second), std::max(c.first, c.second)});
+    else
+      ++grounded;
+  }
   std::sort(pairs.begin(), pairs.end());
   const auto pairs_end = std::unique(pairs.begin(), pairs.end());
-  return pairs_end - pairs.begin() - bodies_of(problem) + 1;
+  const std::ptrdiff_t bodies = bodies_of(problem) + (grounded > 0 ? 1 : 0);
+  return pairs_end - pairs.begin() + grounded - bodies + 1;
 }
 
 /// Steps of Coulomb's law (search_by_steps), whose impulses are the next t.

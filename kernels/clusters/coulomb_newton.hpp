@@ -26,8 +26,9 @@ struct CoulombThresholds {
   /// When velocities count as known though impulses still creep, as redundant contacts let them do for
   /// hundreds of steps. What is asked for is ErrorGoal::enough.
   struct Known {
-    /// Bodies that touch close more loops than this, >= 0, ...
-    std::int32_t loops = 20;
+    /// Bodies that touch close more loops than this, >= 0, all walls that are none of the cluster's bodies
+    /// taken for one, ...
+    std::int32_t loops = 3;
     /// ... and than this part of their number, >= 0, as chains do not.
     double looped = 0.2;
     /// The law finds no more wrong, nor is momentum off by more, than this part of what is asked for, in

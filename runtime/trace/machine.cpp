@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/trace/layout.hpp"
@@ -18,14 +20,30 @@ namespace {
   throw std::invalid_argument("the machine of a replay: " + what);
 }
 
-void demand_positive(double value, const char* name) {
-  if (!(value > 0) || !std::isfinite(value))
-    refuse(fmt::format("{} must be above 0 and finite, got {}", name, value));
+/// What times and factors of a machine may be: those of a step, of thousands of messages and tasks, are added
+/// up in nanoseconds, which end after 292 years. Factors have no unit.
+struct MachineLimits {
+  double longest = 1e3;  ///< latencies, overhead and lines [s]
+  double slowest = 1;    ///< bandwidths [byte/s]
+  double factor = 1e6;   ///< speeds, contacts and noise; and 1 over it of all but noise
+};
+constexpr MachineLimits limits;
+
+void demand(double value, double least, double most, const std::string& name) {
+  if (!(value >= least && value <= most))
+    refuse(fmt::format("{} must be {:g} to {:g}, got {}", name, least, most, value));
 }
 
-void demand_not_negative(double value, const char* name) {
-  if (!(value >= 0) || !std::isfinite(value))
-    refuse(fmt::format("{} must be finite and not negative, got {}", name, value));
+void demand_duration(double value, const char* name) {
+  demand(value, 0, limits.longest, fmt::format("{} [s]", name));
+}
+
+void demand_bandwidth(double value, const char* name) {
+  demand(value, limits.slowest, std::numeric_limits<double>::max(), fmt::format("{} [B/s]", name));
+}
+
+void demand_factor(double value, const std::string& name) {
+  demand(value, 1 / limits.factor, limits.factor, name);
 }
 
 /// Median time from the start of a message to its arrival, of those that somebody was waiting for: only then
@@ -90,31 +108,30 @@ std::string name_of(Schedule schedule) {
 
 void validate(const Machine& machine, const Trace& trace) {
   const auto groups = static_cast<int>(groups_of(trace).size());
-  if (machine.ranks < 1 || machine.threads < 1 || machine.ranks_per_node < 1)
-    refuse(fmt::format("{} ranks with {} threads, {} ranks on a node", machine.ranks, machine.threads,
-                       machine.ranks_per_node));
+  for (const auto& [name, count] : {std::pair{"ranks", machine.ranks}, std::pair{"threads", machine.threads},
+                                    std::pair{"ranks per node", machine.ranks_per_node}})
+    if (count < 1) refuse(fmt::format("{} must be at least 1, got {}", name, count));
   if (machine.ranks > std::max(1, groups))
     refuse(
         fmt::format("{} ranks for {} subdomains: each rank needs one. Record a run with more of them "
                     "(decomposition.subdomains)",
                     machine.ranks, groups));
-  demand_not_negative(machine.latency, "latency");
-  demand_positive(machine.bandwidth, "bandwidth");
-  demand_not_negative(machine.overhead, "overhead");
-  demand_not_negative(machine.node_latency, "node latency");
-  demand_positive(machine.node_bandwidth, "node bandwidth");
-  demand_not_negative(machine.line, "line");
-  demand_not_negative(machine.noise, "noise");
-  demand_not_negative(machine.quantile, "quantile");
-  if (machine.quantile > 1) refuse(fmt::format("quantile must not be above 1, got {}", machine.quantile));
-  demand_positive(machine.speed, "speed");
+  demand_duration(machine.latency, "latency");
+  demand_bandwidth(machine.bandwidth, "bandwidth");
+  demand_duration(machine.overhead, "overhead");
+  demand_duration(machine.node_latency, "node latency");
+  demand_bandwidth(machine.node_bandwidth, "node bandwidth");
+  demand_duration(machine.line, "line");
+  demand(machine.noise, 0, limits.factor, "noise");
+  demand(machine.quantile, 0, 1, "quantile");
+  demand_factor(machine.speed, "speed");
   for (const auto& [kind, speed] : machine.speed_of) {
-    demand_positive(speed, ("speed of " + kind).c_str());
+    demand_factor(speed, "speed of " + kind);
     if (std::none_of(trace.kinds.begin(), trace.kinds.end(),
                      [&kind = kind](const KindInfo& info) { return info.name == kind; }))
       refuse(fmt::format("speed of '{}': no task is called that (talus trace show lists them)", kind));
   }
-  demand_positive(machine.contacts, "contacts scale");
+  demand_factor(machine.contacts, "contacts scale");
 }
 
 Machine recorded_machine(const Trace& trace) {

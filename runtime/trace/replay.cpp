@@ -49,7 +49,6 @@ class Player {
                speeds(machine_, trace_),
                trace_.predicted ? 0 : dispatch_time(trace_),
                machine_.faces()} {
-    validate(machine_, trace_);
     if (groups_.empty()) groups_.push_back(0);
     out_.trace.ranks = machine.ranks;
     out_.trace.threads = machine.threads;
@@ -394,6 +393,7 @@ class Player {
 }  // namespace
 
 Replay replay(const Timeline& timeline, const Machine& machine, bool keep) {
+  validate(machine, timeline.trace());
   return Player(timeline, machine, keep).play();
 }
 

@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "io/scene/scene_error.hpp"
+#include "kernels/bodies/farthest.hpp"
 
 namespace talus::io::detail {
 
@@ -55,8 +56,11 @@ Number number_in(std::string_view field, std::string_view column, const CsvPlace
   if (error != std::errc{} || end != last)
     place.fail(column,
                fmt::format("'{}' is not {}", field, std::is_integral_v<Number> ? "an integer" : "a number"));
-  if constexpr (std::is_floating_point_v<Number>)
+  if constexpr (std::is_floating_point_v<Number>) {
     if (!std::isfinite(value)) place.fail(column, fmt::format("must be finite, got {}", field));
+    if (!within_farthest(value))
+      place.fail(column, fmt::format("must be within {:g}, got {}", farthest, field));
+  }
   return value;
 }
 

@@ -40,13 +40,14 @@ Key<Part> key_of_all(const LawNumberEntry& entry) {
 /// Contacts of a scene with one material.
 template <class Part>
 std::vector<Key<Part>> law_keys() {
+  const Range friction = range_of(law_numbers().front());
   std::vector<Key<Part>> keys = {
       key<Part>(
-          "friction", "", not_negative, "Coulomb friction between grains.", [](auto& part) -> auto& {
+          "friction", "", friction, "Coulomb friction between grains.", [](auto& part) -> auto& {
             return laws_of(part).between(material_of_grains, material_of_grains).friction;
           }),
       key<Part>(
-          "wall_friction", "", not_negative, "Coulomb friction between grains and walls.",
+          "wall_friction", "", friction, "Coulomb friction between grains and walls.",
           [](auto& part) -> auto& {
             return laws_of(part).between(material_of_grains, material_of_walls).friction;
           })};

@@ -64,7 +64,7 @@ struct Reader {
     if (const auto* real = node.as_floating_point();
         real != nullptr && real->get() == std::round(real->get()))
       fail_at(node, path,
-              fmt::format("expected {}, got {}: leave out the point", expected, found_text(node)));
+              fmt::format("expected {}, got {}: write {:.0f}", expected, found_text(node), real->get()));
     if (!node.is_integer()) wrong_type(node);
     return within_range(node, node.as_integer()->get());
   }

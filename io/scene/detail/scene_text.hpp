@@ -9,6 +9,7 @@
 #include "io/scene/detail/scene_key.hpp"
 #include "io/scene/detail/spelling.hpp"
 #include "io/scene/detail/toml_document.hpp"
+#include "kernels/bodies/farthest.hpp"
 
 namespace talus::io::detail {
 
@@ -79,7 +80,11 @@ inline std::string expected_text(const KeyText& key) {
 /// "> 0", ">= 1", "0 to 1"; "" when every finite number will do.
 inline std::string range_text(const Range& range) {
   if (std::isinf(range.low)) return "";
-  if (std::isfinite(range.high)) return fmt::format("{} to {}", range.low, range.high);
+  if (std::isfinite(range.high)) {
+    const bool zeros = range.high >= farthest;  // of a power of ten
+    return zeros ? fmt::format("{} to {:g}", range.low, range.high)
+                 : fmt::format("{} to {}", range.low, range.high);
+  }
   return fmt::format("{} {}", range.without_low ? ">" : ">=", range.low);
 }
 

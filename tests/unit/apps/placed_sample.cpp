@@ -49,6 +49,14 @@ end = { steps = 1 }
   EXPECT_EQ(scene.setup.stress_at_start[1], 0);
   EXPECT_EQ(study_sample((folder / "scene.toml").string(), {}, 1).scene.setup.stress_at_start,
             scene.setup.stress_at_start);
+  // What is wrong with the file is said where the scene names it.
+  scene.samples.front().frame = 99;
+  try {
+    place_sample(scene);
+    FAIL() << "there is one frame";
+  } catch (const io::SceneError& error) {
+    EXPECT_NE(std::string(error.what()).find("scene.toml:8: sample.file: "), std::string::npos) << error.what();
+  }
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "apps/report/sections.hpp"
+#include "io/files/error.hpp"
 #include "io/scene/scene.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
@@ -50,7 +51,7 @@ void make_run(const ScratchDirectory& scratch, const std::string& status, const 
       scratch / "run.json",
       R"({"provenance": {"version": "1.2", "git_hash": "abc", "command_line": ["talus", "run", "my scene.toml"],
             "seed": 7}, "summary": {"status": ")" +
-          status + R"(", "digest": "0123456789abcdef", "message": ""}})");
+          status + R"(", "digest": "0123456789abcdef", "message": "", "steps": 3}})");
   write(scratch / "steps.csv",
         "step,time,time_step,contacts,active,iterations,error_rms,error_max,balance,velocity_error,overlap,"
         "kinetic_translation,kinetic_rotation,wall_s,converged\n"
@@ -81,6 +82,25 @@ TEST(RunReport, SaysWhatWasRunAndHowManyStepsMissed) {
   EXPECT_TRUE(has(page, "tolerance 0.001")) << "it is drawn";
 }
 
+TEST(RunReport, OfARunThatHasEndedIsRefusedWhereItsStepsAreNotThere) {
+  const ScratchDirectory scratch;
+  const std::string header = "step,time,converged\n";
+  for (const char* status : {"done", "stopped", "failed"})
+    for (const std::string& steps :
+         {std::string(), header, header + "1,0.1,1\n2,0.2,1\n", "a,b\n1,2\n" + header}) {
+      make_run(scratch, status);
+      write(scratch / "steps.csv", steps);
+      EXPECT_THROW(run_report(scratch.path()), io::FileError) << status << ": " << steps;
+    }
+  make_run(scratch, "done");
+  std::filesystem::remove(scratch / "steps.csv");
+  EXPECT_THROW(run_report(scratch.path()), io::FileError);
+  make_run(scratch, "failed");
+  write(scratch / "steps.csv", header + "1,0.1,1\n2,0.2,1\n3,0.3,1\n4,0.4,0\n");
+  EXPECT_TRUE(has(run_report(scratch.path()), "1 of 4 steps missed"))
+      << "it may have failed before it was told";
+}
+
 TEST(RunReport, DrawsABoundOfVelocitiesWithFrictionWhereTheSceneSetsOne) {
   const ScratchDirectory unset, set;
   make_run(unset, "done");
@@ -101,7 +121,7 @@ TEST(RunReport, IsWrittenWhileTheRunGoesOn) {
               has(run_report(scratch.path()), "Stage 'down', 50 % done."));
   std::filesystem::remove(scratch / "steps.csv");
   std::filesystem::remove(scratch / "walls.csv");
-  EXPECT_TRUE(has(run_report(scratch.path()), "All 0 steps")) << "a run that has just begun";
+  EXPECT_TRUE(has(run_report(scratch.path()), "No step has ended.")) << "a run that has just begun";
 }
 
 TEST(RunReport, DrawsACurveOfEachProbeAndOfTheCellWhereThereAreSome) {

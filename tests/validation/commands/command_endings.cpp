@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <regex>
 #include <string>
 
 #include "io/results/results.hpp"
@@ -166,6 +167,18 @@ TEST_F(Ending, OnAFullDiskIsInRunJson) {
   EXPECT_NE(outcome.messages.find("too large"), std::string::npos) << outcome.messages;
   EXPECT_EQ(summary(at("results")).at("status"), "failed") << outcome.messages;
   EXPECT_TRUE(summary(at("results")).at("digest").is_null());
+}
+
+TEST_F(Ending, OfAPlanCountsGrainsAndTheirCopies) {
+  write(at("scene.toml"), pressed_box);
+  const auto grains_in = [&](const std::string& subdomains) {
+    const std::string output = run("plan scene.toml --set decomposition.subdomains=" + subdomains).output;
+    std::smatch count;
+    EXPECT_TRUE(std::regex_search(output, count, std::regex("\n  ([0-9]+) grains"))) << output;
+    EXPECT_EQ(output.find(" copies of them in other subdomains") != std::string::npos, subdomains != "1");
+    return count.str(1);
+  };
+  EXPECT_EQ(grains_in("1"), grains_in("4"));
 }
 
 TEST_F(Ending, OfAPlanIsAListOfWhatIsLeftOut) {

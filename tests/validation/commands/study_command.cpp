@@ -234,7 +234,7 @@ TEST_F(StudyError, WholeRunsComeNearerTheReferenceAsTheToleranceFalls) {
 
 TEST_F(StudyError, TimeStepsLongerThanAStageMakeOneStepOfIt) {
   const Outcome outcome = run(std::string(brief) +
-                              "--only run --steps 12 --methods nlgs --tolerances 1e-2 --time-steps 5 --set "
+                              "--only run --steps 8 --methods nlgs --tolerances 1e-2 --time-steps 5 --set "
                               "stage.press.end.steps=2");
   ASSERT_NE(outcome.code, 1) << outcome.messages;
   // Two steps of the first stage become one, six of the second too.
@@ -273,6 +273,8 @@ TEST_F(StudyError, RefusesWhatHasNoMeaningAndWritesNothing) {
         "scene.toml --steps 0", "scene.toml --threads 0", "scene.toml --only both",
         "scene.toml --set solver.tolerances=1", "empty", "", "scene.toml --time-steps 50 --steps 4",
         "scene.toml --only run --time-steps 8 --set 'stage.press.end={time=3e-3}'",
+        "scene.toml --only run --steps 500 --set 'stage.press.end={steps=2}' --set "
+        "'stage.shear.end={steps=2}'",
         // A time of exactly half a step, in numbers that are exact.
         "scene.toml --only run --time-steps 4 --set time_step=0.0009765625 --set "
         "'stage.press.end={time=0.001953125}'"}) {

@@ -69,6 +69,9 @@ TEST_F(CsvBodies, MistakesAreFoundWithLineAndColumn) {
   expect_refused("id,x,y,z,radius\n1,0,0,0\n", 2, "", "5 fields expected as in the header, got 4");
   expect_refused("id,x,y,z,radius\n1,0,0,0,1,2\n", 2, "", "5 fields expected");
   expect_refused("id,x,y,z,radius\n1,0,0,0,1\n1,0,0,2,1\n", 3, "id", "1 stands already on line 2");
+  // Grains that are inserted have ids beyond the largest, and balls of clumps several each.
+  expect_refused("id,x,y,z,radius\n9223372036854775807,0,0,0,1\n", 2, "id", "must be 0 to 1000000000000000");
+  expect_refused("id,x,y,z,radius\n1,0,-1.5e15,0,1\n", 2, "y", "must be within 1e+15, got -1.5e15");
   expect_refused("x,y,z,r\n0,0,0,1\n", 1, "", "the first line must be");
   expect_refused("id,x,y,z,radius\n", 1, "", "no bodies");
 }

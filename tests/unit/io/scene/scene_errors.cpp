@@ -39,7 +39,8 @@ TEST(SceneErrors, WrongTypeSaysWhatWasExpectedAndFound) {
                       "expected list of 3 reals [m/s²], got a list of 2");
   expect_line_refused("#top", "rotation = 1", "rotation", "expected true or false, got the integer 1");
   expect_line_refused("#top", "seed = 1.5", "seed", "expected integer, got the real 1.5");
-  expect_line_refused("#top", "seed = 3.0", "seed", "got the real 3.0: leave out the point");
+  expect_line_refused("#top", "seed = 3.0", "seed", "got the real 3.0: write 3");
+  expect_line_refused("#top", "seed = 1e3", "seed", "write 1000");
   expect_line_refused("#top", "description = high", "", "texts stand in quotes");
   expect_line_refused("#wall", "group = \"drum\"", "wall[0].group", "there are none");
   expect_line_refused("#tail", "[[solver]]", "solver", "must be a table: write [solver]");
@@ -52,7 +53,9 @@ TEST(SceneErrors, NamesLongerThanFilesTakeAreRefused) {
 }
 
 TEST(SceneErrors, NumbersOutOfRangeAreNamedWithTheirLimit) {
-  expect_line_refused("#material", "friction = -0.1", "material.friction", "must be >= 0, got -0.1");
+  expect_line_refused("#material", "friction = -0.1", "material.friction", "must be 0 to 1e+15, got -0.1");
+  expect_line_refused("#material", "friction = 1e200", "material.friction", "must be 0 to 1e+15");
+  expect_line_refused("#stage", "wall_friction = 1e200", "stage[0].wall_friction", "must be 0 to 1e+15");
   expect_line_refused("#material", "restitution = 1.5", "material.restitution", "must be 0 to 1, got 1.5");
   expect_line_refused("#stage", "wall_friction = nan", "stage[0].wall_friction", "must be finite");
   expect_line_refused("#top", "gravity = [0, 0, -inf]", "gravity", "must be finite");

@@ -147,6 +147,7 @@ TEST_F(WallMotions, TablesThatAreWrongAreRefusedByTheirLine) {
   refused("t,x,y,z\n0,0,0,0\n", "two rows or more");
   refused("t,x,y,z\n0.5,0,0,0\n1,0,0,0\n", "way.csv:2: t: must begin at 0 s");
   refused("t,x,y,z\n0,0,0,0\n1,0,0,0\n1,0,0,0\n", "way.csv:4: t: must ascend, got 1 s after 1 s");
+  refused("t,vx,vy,vz\n0,0,0,0\n1,0,0,1e16\n", "way.csv:3: vz: must be within 1e+15, got 1e16");
   refused("t,x,y,z\n0,0,0\n", "way.csv:2: 4 fields expected");
   refused("t,x,y,z\n0,0,zero,0\n", "way.csv:2: y: 'zero' is not a number");
   refused("t,angle\n0,0\n1,1\n", "wall[0].motion[0].axis: missing");

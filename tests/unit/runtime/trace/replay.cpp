@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <string>
 
 #include "io/trace/smpi_platform.hpp"
 #include "runtime/trace/analysis.hpp"
@@ -218,6 +221,29 @@ TEST(Replay, AQuantileStandsForAllTimesOfANode) {
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 10 * 10);
   machine.quantile = 1.5;
   EXPECT_THROW(makespan(trace, machine), std::invalid_argument);
+}
+
+TEST(Replay, RefusesMachinesWhoseStepsEndBeyondItsClock) {
+  const Trace trace = test::one_loop({0}, {}, {10}, 10);
+  const auto refused = [&](const std::string& what, const auto& set) {
+    Machine machine = bare(1, 1);
+    set(machine);
+    try {
+      makespan(trace, machine);
+      ADD_FAILURE() << what;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
+    }
+  };
+  for (const double far : {1e9, 1e300, std::numeric_limits<double>::infinity(), std::nan("")}) {
+    refused("latency [s] must be 0 to 1000, got", [&](Machine& machine) { machine.latency = far; });
+    refused("noise must be 0 to", [&](Machine& machine) { machine.noise = far; });
+    refused("contacts scale must be", [&](Machine& machine) { machine.contacts = far; });
+    refused("speed must be", [&](Machine& machine) { machine.speed = 1 / far; });
+    refused("bandwidth [B/s] must be", [&](Machine& machine) { machine.bandwidth = 1 / far; });
+  }
+  refused("ranks must be at least 1, got -1", [](Machine& machine) { machine.ranks = -1; });
+  refused("ranks per node must be at least 1", [](Machine& machine) { machine.ranks_per_node = 0; });
 }
 
 TEST(Replay, KeepsNodesApartThatMeetBetweenNanoseconds) {
