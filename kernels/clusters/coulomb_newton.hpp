@@ -23,12 +23,16 @@ struct CoulombThresholds {
   /// by which it has to make the residual smaller, in (0, 1).
   int most_iterations = 25, halvings = 5;
   double descent = 0.1;
+  /// Impulses that creep, as those of jammed grains that press one another harder than they need: leaps along
+  /// them at most, >= 0. Each may double the largest one, until this is so many times that of the first step,
+  /// >= 1. Contacts slide that have all but this part of the friction they may have, in (0, 1).
+  int most_leaps = 60;
+  double most_growth = 100, sliding = 1e-9;
   /// When velocities count as known though impulses still creep, as redundant contacts let them do for
   /// hundreds of steps. What is asked for is ErrorGoal::enough.
   struct Known {
-    /// Bodies that touch close more loops than this, >= 0, all walls that are none of the cluster's bodies
-    /// taken for one, ...
-    std::int32_t loops = 3;
+    /// Bodies that touch close more loops than this, >= 0, ...
+    std::int32_t loops = 20;
     /// ... and than this part of their number, >= 0, as chains do not.
     double looped = 0.2;
     /// The law finds no more wrong, nor is momentum off by more, than this part of what is asked for, in
@@ -64,6 +68,10 @@ struct CoulombThresholds {
 /// is the next t; where d no longer changes the law holds. Newton's method solves it, by matrices M + H P'
 /// rho H^T, which are not symmetric. Unlike the convex problem of proximal_newton.hpp it need not have one
 /// solution, and a line search may come to a stop: then the step is taken back and made softer.
+///
+/// Contacts that press one another harder than they need, as those of grains that fell into a V, let go of it
+/// by rho times a hair's breadth in a step. Between two changes of who sticks, slides or carries all such
+/// steps are alike: the impulses leap to the first of those.
 Correction coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
                               const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
                               double& work);

@@ -38,6 +38,8 @@ struct SearchThresholds {
   int idle = 20;
   /// As it is: more than this part of it, in (0, 1), is left behind all of them.
   double shrinks = 0.9;
+  /// After so many of them, >= 1, impulses that creep go on at once to where a contact changes its state.
+  int creeps = 2;
   /// Velocities that have settled while impulses creep on have to stay where the creep ends, so many times
   /// one after another, >= 1; and after so many steps, >= 1, that do not tell where that is they are not
   /// known.
@@ -73,6 +75,7 @@ struct StepStart {
 ///   std::optional<double> to_come(const Correction&, const ClusterGoal&, double& work) const
 ///                                          what steps behind this one may still change, where that is little
 ///                                          enough to be an answer [N s]
+///   double creep_on()                      goes on as the last step has changed the impulses, so many times
 template <class Steps>
 Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
                            const CorrectionThresholds& thresholds, const SearchThresholds& search,
@@ -117,7 +120,7 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
         now.settled = true;
       }
     if constexpr (requires { steps.to_come(now, asked, work); })
-      if (!now.settled)
+      if (!now.settled && std::isfinite(last))
         if (const std::optional<double> rest = steps.to_come(now, asked, work)) {
           now.missed = *rest;
           now.settled = true;
@@ -148,6 +151,11 @@ Correction search_by_steps(const BodyProblem& problem, const ClusterGoal& asked,
     const bool rests = friction && firmness >= thresholds.firmness && now.moved <= goal;
     idle = rests && now.open > search.shrinks * open ? idle + 1 : 0;
     if (idle == 0) open = now.open;
+    if constexpr (requires { steps.creep_on(); })
+      if (idle >= search.creeps && !now.settled && steps.creep_on() > 0) {
+        last = std::numeric_limits<double>::infinity();
+        idle = 0;
+      }
     if (wary > 0)
       --wary;
     else if (steps.firmer(small))

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "kernels/clusters/cluster_solver.hpp"
 #include "tests/unit/kernels/clusters/cluster_makers.hpp"
@@ -39,6 +40,32 @@ TEST(CoulombSteps, AJammedGrainThatHasToSlideUsesAllItsFriction) {
     for (std::size_t k = 0; k < 2; ++k)
       EXPECT_NEAR(impulse_of(problem, answer, k).dot(problem.contacts[k].normal), exact, 1e-3 * exact) << a;
   }
+}
+
+/// A grain that walls of a V press by a million times what moves it, friction holding it down, and that is a
+/// hair's breadth above them: it has to let go of all that. A step of firmness 10^9 takes a thousandth of it
+/// off.
+TEST(CoulombSteps, LeapAlongForcesThatAJammedGrainHasToLetGoOf) {
+  constexpr double a = 0.3, mu = 0.5, pressed = 1e6 * fall, gap = 1e-6 * fall * std::numbers::inv_pi;
+  BodyProblem problem = wedge(a, mu);
+  const double up_friction = fall / (2 * pressed * std::cos(a)) - std::tan(a);
+  for (std::size_t k = 0; k < 2; ++k) {
+    ContactEquation& contact = problem.contacts[k];
+    contact.offset = gap * contact.normal;
+    const Vec3 up = (Vec3::UnitZ() - contact.normal.z() * contact.normal).normalized();
+    problem.impulse[k] = pressed * (contact.normal + up_friction * up);
+  }
+  const ClusterGoal goal{.enough = 1e-8 * fall, .relative = 1e-5};
+  double work = 1e9;
+  const Correction answer = coulomb_correction(problem, goal, {}, {}, work);
+  ASSERT_TRUE(answer.settled);
+  const double exact = (fall - gap / std::sin(a)) / (2 * (std::sin(a) + mu * std::cos(a)));
+  for (std::size_t k = 0; k < 2; ++k)
+    EXPECT_NEAR(impulse_of(problem, answer, k).dot(problem.contacts[k].normal), exact, 1e-3 * exact);
+  EXPECT_NEAR(answer.motion[0].u[2], -gap / std::sin(a), 1e-3 * gap);
+  work = 1e9;
+  EXPECT_FALSE(coulomb_correction(problem, goal, {}, {.most_leaps = 0}, work).settled)
+      << "it is they that help";
 }
 
 /// Two grains in a steep V with friction, wedged in by a hundred times their momentum and moving towards each
