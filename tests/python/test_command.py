@@ -1,5 +1,6 @@
 """Scenes and runs: what Python writes the program reads, and what the program says Python raises."""
 
+import csv
 import os
 import signal
 import threading
@@ -61,7 +62,7 @@ def test_files_of_a_scene_are_found_from_another_folder(tmp_path):
 
 def test_errors_carry_message_and_exit_code(heap, tmp_path):
     heap["material"]["friction"] = -1
-    with pytest.raises(talus.RunError, match="material.friction: must be >= 0") as raised:
+    with pytest.raises(talus.RunError, match="material.friction: must be 0 to") as raised:
         talus.run(heap, tmp_path / "bad", progress=False)
     assert raised.value.exit_code == 2 and "must be >= 0" in raised.value.message
     with pytest.raises(FileNotFoundError):
@@ -191,6 +192,25 @@ def test_an_interrupt_stops_the_run_behind_a_checkpoint(heap, tmp_path):
     assert run.status == "stopped" and run.summary["exit_code"] == 75
 
 
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupt_of_this_process_alone_stops_all_runs_of_a_sweep(heap, tmp_path, jobs):
+    out = tmp_path / "sweep"
+
+    def interrupt():
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline and not list((out / "001").glob("checkpoint_*.h5")):
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        talus.sweep(heap, out, {"stage.0.end.steps": [3, 10**9, 10**8]}, jobs=jobs)
+    assert [talus.open(out / run).status for run in ("000", "001")] == ["done", "stopped"]
+    assert not (out / "002/run.json").exists() or talus.open(out / "002").status == "stopped"
+    with (out / "sweep.csv").open() as file:
+        assert [row["exit_code"] for row in csv.DictReader(file)] == ["0", "75", "75"]
+
+
 def test_a_sweep_is_a_product_with_a_table(heap, tmp_path):
     swept = talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.1, 0.5], jobs=2,
                         measure={"grains": lambda run: len(run.frame(-1).ids)})
@@ -219,7 +239,7 @@ def test_a_sweep_is_a_product_with_a_table(heap, tmp_path):
 def test_a_sweep_says_which_key_it_does_not_know(heap, tmp_path):
     with pytest.raises(talus.SceneError, match="frictoin: no key of the scene"):
         talus.sweep(heap, tmp_path / "sweep", frictoin=[1])
-    with pytest.raises(talus.SceneError, match="must be >= 0"):
+    with pytest.raises(talus.SceneError, match="must be 0 to"):
         talus.sweep(heap, tmp_path / "sweep", friction=[0.1, -1])
     for name in ("material.friction", "steps", "digest"):
         with pytest.raises(ValueError, match=f"a column of its own called {name}"):

@@ -205,6 +205,17 @@ def test_a_damaged_file_is_named(heap_run, tmp_path, content):
         talus.open(other).scene
 
 
+def test_a_status_and_steps_that_no_run_has_are_damage(heap_run, tmp_path):
+    other = tmp_path / "run"
+    shutil.copytree(heap_run.directory, other)
+    (other / "run.json").write_text('{"summary": {"status": 7}}')
+    with pytest.raises(talus.DamagedFile, match="run/run.json: `status` is 7"):
+        talus.open(other).status
+    (other / "steps.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(talus.DamagedFile, match="run/steps.csv: has no column `converged`"):
+        talus.open(other).steps
+
+
 @pytest.mark.parametrize("name, content", [("results.h5", b""), ("results.h5", b"no HDF5"), ("steps.csv", b"\xff\n1\n"),
                                            ("steps.csv", b"step,time\n1\n"), ("steps.csv", b"step,time\n1,2\n"),
                                            ("steps.csv", b"time,converged\n1,1\nabc,1\n"),

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -84,6 +85,7 @@ def run(
     options: Sequence[str] = (),
     progress: bool | Progress = True,
     program: str | os.PathLike[str] | None = None,
+    _stop: threading.Event | None = None,  # set by another thread, where no interrupt reaches this one
 ) -> results.Run:
     """Runs a scene to its end and returns the run. Steps that missed their tolerance are no error: see `Run.missed`.
 
@@ -98,7 +100,7 @@ def run(
 
     Raises Stopped (exit code 75) where the run was stopped behind a checkpoint, RunError with the program's message
     where it failed (1) or the scene or an option is wrong (2), FileExistsError where OUT.toml holds another scene. An
-    interrupt (Ctrl-C) stops the run behind a checkpoint.
+    interrupt (Ctrl-C) stops the run behind a checkpoint, and is raised as KeyboardInterrupt.
     """
     from .scene import Scene
 
@@ -128,7 +130,7 @@ def run(
         words += ["--threads", str(threads)]
     words += ["--force"] * force + ["--resume"] * resume + list(options)
     try:
-        exit_code, stderr = _follow(words, directory, _reporter(progress, name))
+        exit_code, stderr = _follow(words, directory, _reporter(progress, name), _stop)
     except OSError:  # mpirun is missing, for instance
         if written is not None:
             written.take_back()
@@ -200,8 +202,8 @@ def demand_place_of_scene(scene: Scene, directory: Path, replace: bool, advice: 
     _SceneFile(scene, directory).demand_place(replace, advice)
 
 
-def _follow(words: list[str], directory: Path, report: Progress) -> tuple[int, str]:
-    """Runs the command to its end; returns its exit code and what it said on stderr."""
+def _follow(words: list[str], directory: Path, report: Progress, stop: threading.Event | None) -> tuple[int, str]:
+    """Runs the command to its end, or until `stop` is set; returns its exit code and what it said on stderr."""
     began = time.time()
     with tempfile.TemporaryFile("w+", errors="replace") as said:
         process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=said)
@@ -211,6 +213,10 @@ def _follow(words: list[str], directory: Path, report: Progress) -> tuple[int, s
                     process.wait(POLL)
                     break
                 except subprocess.TimeoutExpired:
+                    if stop is not None and stop.is_set():
+                        process.terminate()  # the program writes a checkpoint and ends
+                        process.wait()
+                        break
                     status = _status(directory)
                     if status.get("heartbeat", 0) >= began:  # not that of an earlier run
                         report(status)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import csv
 import itertools
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .command import RunError, demand_place_of_scene, run
+from .command import STOPPED, RunError, Stopped, demand_place_of_scene, run
 from .results import Run
 from .scene import Scene, SceneError
 
@@ -102,7 +103,9 @@ def sweep(
     varied, or a key twice, or a measure has the name of another column, FileExistsError where `out` has runs and neither `resume` nor `force` says what to do with them, or has
     scenes of other values, or of the user's own, which stay. A run that
     fails does not end the others: its row has the exit code, `errors` the message. What a `measure` raises is raised
-    when all runs have ended and the table is written, with NaN in its place.
+    when all runs have ended and the table is written, with NaN in its place. So is an interrupt (Ctrl-C), which stops
+    the runs that go on behind a checkpoint and begins no others: resume=True goes on. Runs of an earlier sweep beyond
+    the number of the new ones stay, and are not in the table.
     """
     base = scene.copy() if isinstance(scene, Scene) else \
         Scene.load(scene) if isinstance(scene, (str, os.PathLike)) else Scene(scene)
@@ -139,17 +142,28 @@ def sweep(
         demand_place_of_scene(changed, directory, replace=force, advice=(
             "a sweep of other values, or of another scene, was made here; take its values, choose another directory, or force=True runs all anew"))
 
+    stop = threading.Event()
+
     def one(changed: Scene, directory: Path) -> RunError | None:
         try:
-            run(changed, directory, ranks=ranks, threads=threads, resume=resume, force=force, options=options,
-                progress=progress, program=program)
+            run(changed, directory, ranks=ranks, threads=threads, resume=resume, force=force,
+                      options=options, progress=progress, program=program, _stop=stop)
         except RunError as error:
             return error
         return None
 
+    failed: list[BaseException] = []
     with ThreadPoolExecutor(jobs) as pool:
-        errors = list(pool.map(one, scenes, directories))
-    failed: list[Exception] = []
+        ended: list[Future[RunError | None]] = [pool.submit(one, *of_run) for of_run in zip(scenes, directories)]
+        try:
+            wait(ended)
+        except KeyboardInterrupt as interrupt:  # only this thread is told
+            stop.set()
+            for future in ended:
+                future.cancel()
+            failed.append(interrupt)
+    errors = [Stopped("not begun", STOPPED, directory) if future.cancelled() else future.result()
+              for future, directory in zip(ended, directories)]
 
     def number_of(name: str, number: Measure, directory: Path) -> float:
         try:
@@ -161,11 +175,11 @@ def sweep(
 
     measured = [{} if error else {name: number_of(name, number, directory) for name, number in (measure or {}).items()}
                 for directory, error in zip(directories, errors)]
-    ended = Sweep(list(values), points, directories, errors, measured)
-    ended.save(out / "sweep.csv")
+    done = Sweep(list(values), points, directories, errors, measured)
+    done.save(out / "sweep.csv")
     if failed:
         raise failed[0]
-    return ended
+    return done
 
 
 def _full_names(scene: Scene, named: Mapping[str, Sequence[Any]], program: str | None) -> dict[str, Sequence[Any]]:

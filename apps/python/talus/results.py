@@ -16,6 +16,9 @@ from .frame import Frame, read_file, text
 from .tables import read_table
 
 
+STATUSES = ("running", "done", "stopped", "failed")
+
+
 def open_run(directory: str | os.PathLike[str]) -> Run:
     """The run in a directory, which may still go on, have been stopped or failed.
 
@@ -70,14 +73,15 @@ class Run:
     @property
     def status(self) -> str:
         """"running", "done", "stopped" or "failed". A run that was killed says "running": `talus status` can tell."""
-        return str(self.summary.get("status", "running"))
+        status = self.summary.get("status", "running")
+        if status not in STATUSES:
+            raise DamagedFile(f"{self.directory / 'run.json'}: `status` is {status!r}, none of {', '.join(STATUSES)}")
+        return str(status)
 
     @property
     def missed(self) -> int:
         """Steps so far that missed their tolerance or overlapped beyond it; 0: every step carries its certificate."""
         steps = self.steps
-        if "converged" not in (steps.dtype.names or ()):
-            raise DamagedFile(f"{self.directory / 'steps.csv'}: has no column `converged`, as the table of a run has")
         return int(np.count_nonzero(~steps["converged"])) if len(steps) else 0
 
     @property
@@ -100,7 +104,10 @@ class Run:
         if not path.exists():
             raise MissingData(f"{self.directory}: no {name}.csv; there are: {', '.join(self.tables) or 'no tables yet'} "
                               "(docs/formats.md says which scene writes which)")
-        return self._read(path, read_table)
+        table = self._read(path, read_table)
+        if name == "steps" and "converged" not in (table.dtype.names or ()):
+            raise DamagedFile(f"{path}: has no column `converged`, as the table of a run has")
+        return table
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):
