@@ -64,7 +64,7 @@ def test_errors_carry_message_and_exit_code(heap, tmp_path):
     heap["material"]["friction"] = -1
     with pytest.raises(talus.RunError, match="material.friction: must be 0 to") as raised:
         talus.run(heap, tmp_path / "bad", progress=False)
-    assert raised.value.exit_code == 2 and "must be >= 0" in raised.value.message
+    assert raised.value.exit_code == 2 and "must be 0 to" in raised.value.message
     with pytest.raises(FileNotFoundError):
         talus.run(heap, tmp_path / "bad", program=tmp_path / "no-talus")
 

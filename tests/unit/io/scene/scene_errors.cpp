@@ -224,7 +224,7 @@ TEST(Overrides, MistakesNameTheOverride) {
   };
   expect_named("solver.tolernce=1", "did you mean 'tolerance'?");
   expect_named("slover.tolerance=1", "did you mean 'solver'?");
-  expect_named("material.friction=-1", "must be >= 0");
+  expect_named("material.friction=-1", "must be 0 to");
   expect_named("material.friction=rough", "got the text 'rough'");
   expect_named("material.density=1e400", "got 1e400, which is out of the range of numbers");
   expect_named("solver.check_every=1", "must be 2 to");
