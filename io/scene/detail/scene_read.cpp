@@ -32,6 +32,18 @@ std::string found_text(const toml::node& node) {
   return node.is_table() ? "a table" : "a date or time";
 }
 
+/// How TOML writes the number that a text means: overrides with ".1" and "1." are texts, and so is what
+/// stands in quotes.
+std::string number_meant(const toml::node& node) {
+  const auto* text = node.as_string();
+  if (text == nullptr) return "";
+  const std::string& held = text->get();
+  double number = 0;
+  const auto [end, error] = std::from_chars(held.data(), held.data() + held.size(), number);
+  const bool means = error == std::errc{} && end == held.data() + held.size() && std::isfinite(number);
+  return means ? ": write " + toml_text(number) : "";
+}
+
 /// Products of numbers of these units have to stay numbers, as those of pressures and areas.
 double largest_in(const std::string& unit) {
   for (const char* length : {"m", "m/s", "rad/s", "1/s"})
@@ -69,7 +81,9 @@ struct Reader {
     return within_range(node, node.as_integer()->get());
   }
   double real(const toml::node& node) const {
-    if (!node.is_number()) wrong_type(node);
+    if (!node.is_number())
+      fail_at(node, path,
+              fmt::format("expected {}, got {}{}", expected, found_text(node), number_meant(node)));
     return within_range(node, *node.value<double>());
   }
 };

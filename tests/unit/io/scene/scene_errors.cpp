@@ -226,6 +226,9 @@ TEST(Overrides, MistakesNameTheOverride) {
   expect_named("slover.tolerance=1", "did you mean 'solver'?");
   expect_named("material.friction=-1", "must be 0 to");
   expect_named("material.friction=rough", "got the text 'rough'");
+  expect_named("time_step=.001", "got the text '.001': write 0.001");
+  expect_named("time_step=1.", "got the text '1.': write 1.0");
+  expect_named("gravity=\"1\"", "got the text '1'");
   expect_named("material.density=1e400", "got 1e400, which is out of the range of numbers");
   expect_named("solver.check_every=1", "must be 2 to");
   expect_named("description=\xff", "not UTF-8");
