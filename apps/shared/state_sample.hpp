@@ -25,8 +25,8 @@ struct StateSample {
 };
 
 /// Reads the checkpoint or the frame that the scene names. Materials are those of the same name.
-/// Throws io::SceneError, at the scene's line, for a file that cannot be read, for clumps, where bodies are of
-/// materials that the scene has not, and where the scene's periodic cell is not that of the state.
+/// Throws io::SceneError, at the scene's line, for a file that cannot be read, for clumps, where bodies are
+/// of materials that the scene has not, and where the scene's periodic cell is not that of the state.
 StateSample read_state(const io::Scene& scene);
 
 /// Setup::stress_at_start of a sample with these forces, when its walls are placed: what a periodic cell

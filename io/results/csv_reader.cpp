@@ -51,7 +51,8 @@ class Cells {
 
  private:
   [[noreturn]] void fail() const {
-    throw FileError(path_.string(), "is not as Talus wrote it: restore it, or run the scene anew in another directory");
+    throw FileError(path_.string(),
+                    "is not as Talus wrote it: restore it, or run the scene anew in another directory");
   }
 
   std::string_view line_;

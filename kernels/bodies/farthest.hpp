@@ -5,7 +5,8 @@
 namespace talus {
 
 /// Coordinates [m] and velocities [m/s] of grains, coordinates and lengths of surfaces [m], and coefficients
-/// of friction are refused beyond it: squares, and numbers of cells of the detection, would leave their types.
+/// of friction are refused beyond it: squares, and numbers of cells of the detection, would leave their
+/// types.
 inline constexpr double farthest = 1e15;
 
 /// False for NaN.

@@ -55,7 +55,8 @@ end = { steps = 1 }
     place_sample(scene);
     FAIL() << "there is one frame";
   } catch (const io::SceneError& error) {
-    EXPECT_NE(std::string(error.what()).find("scene.toml:8: sample.file: "), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("scene.toml:8: sample.file: "), std::string::npos)
+        << error.what();
   }
 }
 
