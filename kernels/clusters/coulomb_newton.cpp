@@ -138,6 +138,7 @@ class CoulombSteps {
     if (first_largest_ == 0) first_largest_ = largest;
     if (rolling_ || leaps_ >= thresholds_.most_leaps || largest > thresholds_.most_growth * first_largest_)
       return 0;
+    if (!(most > 0)) return 0;
     length = std::min(length, largest / most);
     if (!(length >= 1)) return 0;
     ++leaps_;
