@@ -24,12 +24,12 @@ void Tally::add(const Simulation& simulation) {
     ++stagnated;
     floor = std::max(floor, report.error_rms);
   }
-  if (simulation.iterations().jammed && !report.converged)
-    ++jammed;
-  else if (simulation.iterations().locked && !report.converged)
-    ++locked;
-  else if (simulation.iterations().unanswered && !report.converged)
-    ++unanswered;
+  if (!report.converged) {
+    const AnswerState answers = simulation.iterations().answers;
+    jammed += answers == AnswerState::jammed;
+    locked += answers == AnswerState::locked;
+    unanswered += answers == AnswerState::missing;
+  }
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
   if (report.converged) worst_velocity = larger(worst_velocity, report.velocity_error);

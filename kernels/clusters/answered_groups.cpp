@@ -55,15 +55,18 @@ class Groups {
   /// Sets what the errors of a group are compared with. What rounding makes must pass whatever is asked.
   void measure(AnsweredGroup& own) const {
     const BodyProblem& problem = own.group.problem;
-    const Measures row = measures_of(problem, goal_.faces);
+    Measures row = measures_of(problem, goal_.faces);
     const double share = everywhere_.mass > 0 ? row[MeasureColumn::mass] / everywhere_.mass : 0;
     own.floor = thresholds_.elsewhere * everywhere_.scale * share;
     own.scale = std::max(scale_of(row, thresholds_), own.floor);
+    row[MeasureColumn::drive] = 0;  // how fast walls or a flow are says nothing of forces
+    own.exchanged = std::min(own.scale, std::max(scale_of(row, thresholds_), own.floor));
     own.noise = thresholds_.rounding * most_momentum(row[MeasureColumn::mass], row[MeasureColumn::incoming]);
     const double still = thresholds_.still * row[MeasureColumn::mass] * goal_.still / enough_;
     own.lopsided = still > thresholds_.slight * own.scale && lopsided(problem, thresholds_.lopsided);
     if (!own.lopsided) {
       own.scale = std::max(own.scale, still);
+      own.exchanged = std::max(own.exchanged, still);
       own.noise = std::max(own.noise, still);
     }
     own.at_wall = std::max(own.noise, still);
@@ -99,10 +102,10 @@ class Groups {
       }
       AnsweredGroup& own = groups_.emplace_back(AnsweredGroup{.group = std::move(group), .answer = {}});
       measure(own);
-      double part = 1;
+      double part = own.scale > 0 ? own.exchanged / own.scale : 1;
       for (const std::size_t b : own.group.bodies) part = std::min(part, least_[b] / own.scale);
       answer(part * goal_.enough, own);
-      if (!own.answer.solved && part < 1) answer(goal_.enough, own);
+      if (!own.answer.solved() && part < 1) answer(goal_.enough, own);
       if (!presses(own)) continue;
       for (const std::size_t b : own.group.bodies)
         if (own.scale > 0) least_[b] = std::min(least_[b], own.scale);
@@ -117,7 +120,7 @@ class Groups {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const BodyProblem& problem = groups_[g].group.problem;
       const std::vector<Twist> own = added(velocities_of(problem, problem.impulse),
-                                           groups_[g].answer.solved ? 1 : 0, groups_[g].answer.motion);
+                                           groups_[g].answer.solved() ? 1 : 0, groups_[g].answer.motion);
       for (std::size_t b = 0; b < own.size(); ++b) {
         V[groups_[g].group.bodies[b]] = own[b];
         of_body[groups_[g].group.bodies[b]] = g;
@@ -163,12 +166,12 @@ class Groups {
           (!answer.moment.empty() && some(answer.moment[k])))
         joins[k] = 1;
     std::vector<LoadedGroup> groups = loaded_groups(problem, joins);
-    if (groups.size() == 1 || !answer.solved) return parts.push_back(std::move(whole));
+    if (groups.size() == 1 || !answer.solved()) return parts.push_back(std::move(whole));
     const double unknown = larger(0.0, answer.error - momentum_of(problem, answer.motion));
     for (LoadedGroup& group : groups) {
       AnsweredGroup part{.group = std::move(group), .answer = {}};
       measure(part);
-      part.answer.solved = true;
+      part.answer.state = AnswerState::found;
       part.answer.helps = answer.helps;
       for (std::size_t& b : part.group.bodies) {
         part.answer.motion.push_back(answer.motion[b]);

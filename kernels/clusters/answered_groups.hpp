@@ -15,6 +15,7 @@ struct AnsweredGroup {
   LoadedGroup group;
   ClusterAnswer answer;
   double scale = 0;        ///< what its errors are compared with [N s]
+  double exchanged = 0;    ///< likewise if nothing were driven: by that forces have to be known
   double floor = 0;        ///< what is done elsewhere makes of that [N s]
   double noise = 0;        ///< what rounding leaves of its momentum [N s]
   double at_wall = 0;      ///< likewise of a wall's impulse

@@ -71,7 +71,7 @@ bool meets_law(const LawDefect& defect, const ClusterGoal& goal, const ClusterTh
 /// also by the scale of what contacts do, beside which walls may press much harder.
 bool as_good(const BodyProblem& problem, const ClusterAnswer& answer, const LawDefect& defect,
              const ClusterGoal& goal, const ClusterThresholds& thresholds) {
-  if (!answer.solved || !meets_law(defect, goal, thresholds)) return false;
+  if (!answer.solved() || !meets_law(defect, goal, thresholds)) return false;
   const std::vector<Twist> done = exchanged(problem);
   const double apart = std::min(goal.enough, goal.relative * momentum_of(problem, done));
   const double norm =
@@ -96,7 +96,7 @@ void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThr
     const ContactEquation& c = problem.contacts[k];
     changed[k] = project_on_cone(changed[k] + answer.impulse[k], c.normal, c.mu);
     answer.impulse[k] = changed[k] - problem.impulse[k];
-    if (answer.solved) answer.found[k] = answer.impulse[k];
+    if (answer.solved()) answer.found[k] = answer.impulse[k];
   }
   for (std::size_t k = 0; k < answer.moment.size(); ++k)
     answer.moment[k] = admissible_change(problem, k, changed[k], answer.moment[k]);
@@ -110,25 +110,25 @@ void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThr
 /// rounds that have not settled are not taken: all that they have found counts as uncertain.
 ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const Correction& correction) {
   ClusterAnswer answer;
-  answer.solved = correction.settled;
+  answer.state = correction.settled ? AnswerState::found : AnswerState::missing;
   answer.knows_moments = correction.knows_moments;
-  if (answer.solved) answer.moment = correction.moment;
+  if (answer.solved()) answer.moment = correction.moment;
   const std::vector<Twist> then = velocities_of(from, from.impulse), since = velocities_of(now, now.impulse);
   for (std::size_t k = 0; k < from.contacts.size(); ++k) {
     const Vec3 change = now.impulse[k] - from.impulse[k];
     answer.found.push_back(change + correction.impulse[k]);
-    answer.impulse.push_back(answer.solved ? answer.found.back() : change);
+    answer.impulse.push_back(answer.solved() ? answer.found.back() : change);
   }
   for (std::size_t b = 0; b < then.size(); ++b) {
     Twist motion{since[b].u - then[b].u, since[b].w - then[b].w};
-    if (answer.solved) {
+    if (answer.solved()) {
       motion.u += correction.motion[b].u;
       motion.w += correction.motion[b].w;
     }
     answer.motion.push_back(motion);
   }
   answer.error =
-      momentum_of(from, answer.motion) + (answer.solved ? correction.uncertain() : correction.error());
+      momentum_of(from, answer.motion) + (answer.solved() ? correction.uncertain() : correction.error());
   return answer;
 }
 
@@ -149,10 +149,10 @@ void solve_by_matrix(const BodyProblem& problem, double enough, double work,
     if (report.iterations == 0 && !last) continue;
     BodyProblem now = problem;
     now.impulse = matrix.impulses();
-    ClusterAnswer other = answer_of(problem, now, correction_of(now, enough, thresholds.correction));
+    ClusterAnswer other = answer_of(problem, now, correction_of(now, enough, thresholds.correction).best);
     // Of answers that are none the nearest says most.
-    if (other.solved || other.error < answer.error) answer = std::move(other);
-    if (answer.solved) break;
+    if (other.solved() || other.error < answer.error) answer = std::move(other);
+    if (answer.solved()) break;
   }
 }
 
@@ -163,18 +163,19 @@ bool velocities_suffice(const BodyProblem& problem, ClusterGoal goal, const Clus
   const LawDefect defect = law_defect(problem, problem.impulse);
   if (!meets_law(defect, goal, thresholds)) return false;
   goal.forces = false;
-  ClusterAnswer other = answer_of(
-      problem, problem, proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, work));
+  ClusterAnswer other =
+      answer_of(problem, problem,
+                proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, work).best);
   if (!as_good(problem, other, defect, goal, thresholds)) return false;
   answer = std::move(other);
   return true;
 }
 
 /// Rounds may not settle, as contacts close on bodies and part by the last bit of their velocities.
-bool lost_in_rounding(const BodyProblem& problem, const Correction& rounds, const ClusterGoal& goal,
+bool lost_in_rounding(const BodyProblem& problem, const RoundsCorrection& rounds, const ClusterGoal& goal,
                       const ClusterThresholds& thresholds) {
-  double wrong = larger(rounds.at_first, rounds.error());
-  for (const Vec3& change : rounds.impulse) wrong = larger(wrong, change.norm());
+  double wrong = larger(rounds.at_first, rounds.best.error());
+  for (const Vec3& change : rounds.best.impulse) wrong = larger(wrong, change.norm());
   return wrong <= thresholds.rounding * mass_of(problem) * goal.still &&
          mass_ratio(problem) <= thresholds.rounding_apart;
 }
@@ -185,14 +186,16 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
   const double budget = (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) *
                         sweep_cost(blocks_of(problem), problem.contacts.size());
   bool stuck = true;
-  const auto take = [&](const Correction& correction) {
-    stuck = stuck && correction.stuck;
-    ClusterAnswer other = answer_of(problem, problem, correction);
-    if (other.solved || other.error < answer.error) answer = std::move(other);
+  const auto take = [&](const StepsCorrection& steps) {
+    stuck = stuck && steps.stuck;
+    ClusterAnswer other = answer_of(problem, problem, steps.best);
+    if (other.solved() || other.error < answer.error) answer = std::move(other);
   };
   double left = thresholds.admissible_share * budget;
-  answer.jammed = !problem.has_cell() && none_admissible(problem, goal.enough, thresholds.admissible, left);
-  if (answer.jammed) return;
+  if (!problem.has_cell() && none_admissible(problem, goal.enough, thresholds.admissible, left)) {
+    answer.state = AnswerState::jammed;
+    return;
+  }
   if (has_friction(problem)) {
     left += thresholds.coulomb_share * budget;
     take(coulomb_correction(problem, goal, thresholds.correction, thresholds.coulomb, left));
@@ -200,22 +203,23 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
     return;
   }
   left += thresholds.proximal_share * budget;
-  if (!answer.solved)
+  if (!answer.solved())
     take(proximal_correction(problem, goal, thresholds.correction, thresholds.proximal, left));
   left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;
   // A cell that follows a stress couples all contacts: the matrix would be full. And where steps of all
   // kinds press contacts against one another without end, these solvers would, too.
-  if (!answer.solved && !problem.has_cell() && !stuck)
+  if (!answer.solved() && !problem.has_cell() && !stuck)
     solve_by_matrix(problem, goal.enough, left, thresholds, answer);
-  if (answer.solved || problem.has_cell() || !has_friction(problem)) return;
+  if (answer.solved() || problem.has_cell() || !has_friction(problem)) return;
   left = thresholds.admissible_share * budget;
-  answer.locked = friction_may_lock(problem, goal.enough, thresholds.admissible, left);
+  if (friction_may_lock(problem, goal.enough, thresholds.admissible, left))
+    answer.state = AnswerState::locked;
 }
 
 /// Where an answer takes moments as given: what the rounds, which do not, would change in velocities or in an
 /// impulse counts if it is more.
-void take_worse(const Correction& rounds, const std::vector<Vec3>& found, ClusterAnswer& answer) {
-  answer.error = larger(answer.error, rounds.error() + rounds.rest);
+void take_worse(const RoundsCorrection& rounds, const std::vector<Vec3>& found, ClusterAnswer& answer) {
+  answer.error = larger(answer.error, rounds.best.error() + rounds.to_come);
   for (std::size_t k = 0; k < found.size(); ++k)
     if (!(found[k].norm() <= answer.found[k].norm())) answer.found[k] = found[k];
 }
@@ -232,12 +236,12 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
     answer.error = std::numeric_limits<double>::quiet_NaN();
     return answer;
   }
-  const Correction rounds = correction_of(problem, goal.enough, thresholds.correction);
-  answer = answer_of(problem, problem, rounds);
+  const RoundsCorrection rounds = correction_of(problem, goal.enough, thresholds.correction);
+  answer = answer_of(problem, problem, rounds.best);
   const std::vector<Vec3> found = answer.found;
-  answer.solved = answer.solved || lost_in_rounding(problem, rounds, goal, thresholds);
-  if (!answer.solved) search(problem, goal, thresholds, answer);
-  const bool estimate = has_rolling(problem) && !(answer.solved && answer.knows_moments);
+  if (lost_in_rounding(problem, rounds, goal, thresholds)) answer.state = AnswerState::found;
+  if (!answer.solved()) search(problem, goal, thresholds, answer);
+  const bool estimate = has_rolling(problem) && !(answer.solved() && answer.knows_moments);
   admit(problem, goal, thresholds, answer);
   if (estimate) take_worse(rounds, found, answer);
   return answer;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/clusters/admissible.hpp"
+#include "kernels/clusters/answer_state.hpp"
 #include "kernels/clusters/correction.hpp"
 #include "kernels/clusters/coulomb_newton.hpp"
 #include "kernels/clusters/proximal_newton.hpp"
@@ -60,12 +61,11 @@ struct ClusterAnswer {
   std::vector<Vec3> found;    ///< per contact: `impulse` where solved; else what the best of the rounds would
                               ///< change, an estimate of what r is off by [N s]
   double error = 0;           ///< momentum of the motion, and what is not known of it [N s]
-  bool solved = false;  ///< impulses and velocities satisfy the law but for what is small; impulses that
-                        ///< stay, also where others would share forces among redundant contacts
+  AnswerState state = AnswerState::missing;
   bool knows_moments = false;  ///< Correction::knows_moments
   bool helps = false;          ///< with the change they are nearer to it than before
-  bool jammed = false;         ///< there is none: none_admissible
-  bool locked = false;         ///< none was found, and it may be friction that locks: friction_may_lock
+
+  bool solved() const { return state == AnswerState::found; }
 };
 
 /// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, but find no more
@@ -74,10 +74,10 @@ struct ClusterAnswer {
 /// friction ask first for the velocities alone, and end where these are those of impulses that meet the law;
 /// and where these do not either, with what is left of the budget the solvers that keep W
 /// (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there; not where
-/// steps of all kinds were stuck (Correction::stuck). All but the rounds take moments of rolling resistance
-/// as given: beside their answers what the rounds would change counts as error, if it is more, an estimate.
-/// All by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values
-/// that are not finite come back as an error that is not.
+/// steps of all kinds were stuck (StepsCorrection::stuck). All but the rounds take moments of rolling
+/// resistance as given: beside their answers what the rounds would change counts as error, if it is more, an
+/// estimate. All by counted work, so the same bits come out every time. The changed impulses lie on the
+/// cones. Values that are not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

@@ -133,13 +133,22 @@ bool stand(const BodyProblem& problem, const std::vector<ContactState>& then, do
   return same;
 }
 
+/// What the updates of the multipliers in a round have left.
+struct Updates {
+  double missed = 0;   ///< wishes of contacts that the motion does not grant [N s]
+  double left = 0;     ///< what rounding may leave of the linear system [N s]
+  double moved = 0;    ///< momentum by which the last one has changed the motion [N s]
+  double to_come = 0;  ///< and what further ones would add, by the ratio of the last two [N s]
+  double pushed = 0;   ///< part of the largest impulse by which the last one has changed an impulse, at most
+};
+
 /// Where geometry amplifies, wishes that are missed by next to nothing may hide much of the motion; and where
 /// light bodies pass the force on between heavy ones, much of the forces behind next to no momentum.
-bool converged(const BodyProblem& problem, const Correction& now, double goal,
+bool converged(const BodyProblem& problem, const Updates& updates, double goal,
                const CorrectionThresholds& thresholds) {
-  const double most = larger(goal, now.left);
-  return now.updated <= most &&
-         (has_friction(problem) ? now.coming <= most : now.pushed <= thresholds.same_forces);
+  const double most = larger(goal, updates.left);
+  return updates.moved <= most &&
+         (has_friction(problem) ? updates.to_come <= most : updates.pushed <= thresholds.same_forces);
 }
 
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
@@ -153,24 +162,25 @@ class Round {
         active_(active_part(all, set, thresholds.firmness)),
         firm_(active_.problem, thresholds.firmness, active_.moments) {}
 
-  /// The motion; the multipliers go to the set's `change`, what is missed and left to `result`.
-  std::vector<Twist> solve(Correction& result) {
+  /// The motion; the multipliers go to the set's `change`.
+  std::vector<Twist> solve(Updates& updates) {
     std::vector<Twist> motion(all_.bodies.size());
     double before = std::numeric_limits<double>::infinity();
     for (int update = 0; update < thresholds_.most_updates; ++update) {
       FirmContacts::Solution solution = firm_.solve(force());
-      result.left = momentum_of(all_, solution.last);
-      const bool granted = take_multipliers(solution.motion, result);
+      updates.left = momentum_of(all_, solution.last);
+      const bool granted = take_multipliers(solution.motion, updates);
       const double moved = momentum_of(all_, added(solution.motion, -1, motion));
       // The first update says nothing of how fast they decay.
-      const bool alone = update == 0 && moved > result.left;
-      result.coming = alone ? std::numeric_limits<double>::infinity() : rest_of(before, moved, result.left);
-      result.updated = moved;
+      const bool alone = update == 0 && moved > updates.left;
+      updates.to_come =
+          alone ? std::numeric_limits<double>::infinity() : rest_of(before, moved, updates.left);
+      updates.moved = moved;
       before = moved;
       motion = std::move(solution.motion);
       if (granted &&
-          converged(all_, result, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_) &&
-          !leap(result))
+          converged(all_, updates, goal_of(momentum_of(all_, motion), enough_, thresholds_), thresholds_) &&
+          !leap(updates))
         break;
     }
     return motion;
@@ -181,12 +191,12 @@ class Round {
   /// W hardly resists all those to come may be most of the forces; they follow one another by one ratio, and
   /// the multipliers go on by all of them at once. False, and nothing is done, where they do not: along
   /// redundant contacts, which W does not resist at all, rounding changes multipliers, by no ratio.
-  bool leap(Correction& result) {
+  bool leap(Updates& updates) {
     if (has_friction(all_) || has_rolling(all_) ||
-        result.pushed <= thresholds_.rounding * thresholds_.firmness)
+        updates.pushed <= thresholds_.rounding * thresholds_.firmness)
       return false;
     const std::vector<Vec3> kept = set_.change;
-    Correction next;
+    Updates next;
     std::array<double, 3> pushed{};  // [N s]
     std::vector<Vec3> last;
     for (double& push : pushed) {
@@ -203,7 +213,7 @@ class Round {
       return false;
     }
     for (const std::size_t k : active_.origin) set_.change[k] += times * (set_.change[k] - last[k]);
-    result.pushed = times * next.pushed;
+    updates.pushed = times * next.pushed;
     return true;
   }
 
@@ -225,20 +235,20 @@ class Round {
   }
 
   /// s += rho (w - H^T d). True when the wishes are granted but for what is small.
-  bool take_multipliers(const std::vector<Twist>& motion, Correction& result) {
+  bool take_multipliers(const std::vector<Twist>& motion, Updates& updates) {
     const std::vector<Vec3> before = set_.change;
     for (std::size_t k = 0; k < all_.contacts.size(); ++k)
       if (set_.state[k] == ContactState::open) set_.change[k] = -all_.impulse[k];
-    result.missed = set_.rolling.take_multipliers(thresholds_.firmness, motion);
+    updates.missed = set_.rolling.take_multipliers(thresholds_.firmness, motion);
     for (std::size_t a = 0; a < active_.origin.size(); ++a) {
       const std::size_t k = active_.origin[a];
       const ContactEquation& c = active_.problem.contacts[a];
       const Vec3 rest = constrained(c, set_.wish(all_, k)) - constrained(c, relative_velocity(c, motion));
       set_.change[k] = multiplier(a) + firm_.rho(a) * rest + set_.known(all_, k);
-      result.missed += effective_mass(active_.problem, c) * rest.norm();
+      updates.missed += effective_mass(active_.problem, c) * rest.norm();
     }
-    result.pushed = pushed_by(all_, before, set_.change);
-    return result.missed <= goal_of(momentum_of(all_, motion), enough_, thresholds_);
+    updates.pushed = pushed_by(all_, before, set_.change);
+    return updates.missed <= goal_of(momentum_of(all_, motion), enough_, thresholds_);
   }
 
   const BodyProblem& all_;
@@ -256,15 +266,14 @@ double carried_by(const BodyProblem& problem, std::span<const Vec3> change) {
   return sum;
 }
 
-/// Of impulses that are an answer themselves.
-Correction unchanged(const BodyProblem& problem, double at_first) {
+/// Of impulses that are an answer themselves, but for so much.
+RoundsCorrection unchanged(const BodyProblem& problem, double at_first) {
   Correction none;
   none.impulse.assign(problem.contacts.size(), Vec3::Zero());
   none.motion.resize(problem.bodies.size());
-  none.open = none.at_first = at_first;
-  none.rounds = 1;
+  none.open = at_first;
   none.settled = none.knows_moments = true;
-  return none;
+  return {std::move(none), at_first};
 }
 
 }  // namespace
@@ -317,7 +326,8 @@ double rest_of(double before, double now, double rounding) {
   return now < before ? now * now / (before - now) : std::numeric_limits<double>::infinity();
 }
 
-Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds) {
+RoundsCorrection correction_of(const BodyProblem& problem, double enough,
+                               const CorrectionThresholds& thresholds) {
   const bool friction = has_friction(problem);
   std::vector<Twist> motion(problem.bodies.size());
   ActiveSet set = empty_set(problem);
@@ -330,53 +340,49 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
                                                                  apart < 2 && error <= enough)
     return unchanged(problem, error);
   // Rounds that do not settle may carry the motion off: the best one counts.
-  Correction best = unchanged(problem, std::numeric_limits<double>::infinity());
-  best.settled = false;
+  RoundsCorrection rounds = unchanged(problem, std::numeric_limits<double>::infinity());
+  rounds.best.settled = false;
   double least = std::numeric_limits<double>::infinity();
   const int most = rolling    ? thresholds.most_rolling_rounds
                    : friction ? thresholds.most_sliding_rounds
                               : thresholds.most_rounds;
-  int rounds = 0;
-  double at_first = 0, rest = 0, moved = std::numeric_limits<double>::infinity();
-  for (int since = 0; rounds < most && since < thresholds.patience; ++since) {
-    ++rounds;
-    Correction now;
+  double moved = std::numeric_limits<double>::infinity();
+  for (int k = 1, since = 0; k <= most && since < thresholds.patience; ++k, ++since) {
+    Updates updates;
     const std::vector<Twist> before =
-        std::exchange(motion, Round(problem, set, enough, thresholds).solve(now));
-    now.impulse = set.change;
-    now.moment = set.rolling.change();
-    now.knows_moments = true;
-    now.motion = motion;
-    now.found = momentum_of(problem, motion);
+        std::exchange(motion, Round(problem, set, enough, thresholds).solve(updates));
+    Correction now{.motion = motion,
+                   .impulse = set.change,
+                   .moment = set.rolling.change(),
+                   .knows_moments = true,
+                   .found = momentum_of(problem, motion),
+                   .missed = updates.missed,
+                   .left = larger(updates.left, updates.moved)};
     const std::vector<ContactState> then = set.state;
     const RollingSet rolled = set.rolling;
     now.open = see_states(problem, thresholds.firmness, motion, set);
-    now.moved = momentum_of(problem, added(motion, -1, before));
+    const double before_last = std::exchange(moved, momentum_of(problem, added(motion, -1, before)));
     // Of further rounds: the direction of sliding may lag by the same small part in each.
-    const double to_come = rest_of(moved, now.moved, now.left);
-    moved = now.moved;
-    rest = std::min(to_come, thresholds.creeping * now.moved);
-    if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
+    const double to_come = rest_of(before_last, moved, updates.left);
+    rounds.to_come = std::min(to_come, thresholds.creeping * moved);
+    if (k == 1) rounds.at_first = larger(wrong, now.found + now.missed + updates.left);
     const bool stays = friction ? set.state == then && set.rolling.same_as(rolled)
                                 : stand(problem, then, thresholds.rounding, set);
-    if (rounds == 1 && apart <= thresholds.most_apart && at_first <= thresholds.exact * enough && stays)
-      return unchanged(problem, at_first);
+    if (k == 1 && apart <= thresholds.most_apart && rounds.at_first <= thresholds.exact * enough && stays)
+      return unchanged(problem, rounds.at_first);
     const double goal = goal_of(now.found, enough, thresholds);
     // What the law finds wrong with a light body may be what heavy ones press by, as many times as much.
     const double law = now.open * std::max(1.0, thresholds.tolerance * apart);
-    now.settled = law <= goal && now.left <= enough && converged(problem, now, goal, thresholds) &&
-                  (friction ? rounds > 1 && larger(now.moved, to_come) <= goal : stays);
+    now.settled = law <= goal && updates.left <= enough && converged(problem, updates, goal, thresholds) &&
+                  (friction ? k > 1 && larger(moved, to_come) <= goal : stays);
     if (now.settled || now.error() < least) {
       least = now.error();
-      best = std::move(now);
+      rounds.best = std::move(now);
       since = -1;
     }
-    if (best.settled) break;
+    if (rounds.best.settled) break;
   }
-  best.rounds = rounds;
-  best.rest = rest;
-  best.at_first = at_first;
-  return best;
+  return rounds;
 }
 
 }  // namespace talus

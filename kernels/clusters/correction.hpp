@@ -78,27 +78,23 @@ struct Correction {
                                ///< none does, or nothing changes
   bool knows_moments = false;  ///< these are unknowns, too; else they are taken as given
   double found = 0;            ///< momentum of the motion [N s]
-  double missed = 0;           ///< wishes of contacts that the motion does not grant [N s]
-  double open = 0;             ///< what the natural map still finds wrong behind the last round [N s]
-  double left = 0;             ///< what rounding may leave of the linear system [N s]
-  double at_first = 0;         ///< what the law and the first round find wrong with the impulses [N s]
-  double moved = 0;            ///< momentum by which the last round has changed the motion [N s]
-  double updated = 0;          ///< likewise the last update of the multipliers
-  double coming = 0;           ///< and what further ones would add, by the ratio of the last two [N s]
-  double pushed = 0;  ///< part of the largest impulse by which the last update, or the last proximal step,
-                      ///< has changed an impulse, at most
-  double rest = 0;    ///< what further rounds would add to the last, by the ratio of the last two, or so many
-                      ///< like it (CorrectionThresholds::creeping) [N s]
-  int rounds = 0;
-  bool settled = false;  ///< without friction no contact changed its state any more, with it the last round
-                         ///< changed next to nothing, and so will further ones; and rounding leaves less than
-                         ///< need not be known. Of proximal steps: further ones would change next to nothing
-  bool stuck = false;  ///< proximal steps went on without moving or mending anything (SearchThresholds::idle)
+  double missed = 0;           ///< what the motion lacks, as far as that is known [N s]
+  double open = 0;             ///< what the natural map still finds wrong with motion and impulses [N s]
+  double left = 0;       ///< what the linear systems, or rounding, leave of the balance of momentum [N s]
+  bool settled = false;  ///< it is an answer: going on would change next to nothing
 
   /// All of it [N s].
   double error() const { return found + uncertain(); }
   /// What is not known of it [N s].
-  double uncertain() const { return missed + open + larger(left, updated); }
+  double uncertain() const { return missed + open + left; }
+};
+
+/// What rounds of Newton's method have found. `missed` are wishes of contacts that the motion does not grant.
+struct RoundsCorrection {
+  Correction best;
+  double at_first = 0;  ///< what the law and the first round find wrong with the impulses [N s]
+  double to_come = 0;   ///< what further rounds would add to the last, by the ratio of the last two, or so
+                        ///< many like it (CorrectionThresholds::creeping) [N s]
 };
 
 /// The Newton step from the impulses of `problem`. `enough`: momentum [N s] below which an error need not be
@@ -118,8 +114,8 @@ struct Correction {
 /// the direction of sliding is that of the last velocities: there two rounds have to agree in any case; where
 /// contacts carry more than they must, as in a jammed wedge, they may never do. Moments of contacts that
 /// resist rolling are held, below their bounds, or put on those that the last normal impulses give.
-Correction correction_of(const BodyProblem& problem, double enough,
-                         const CorrectionThresholds& thresholds = {});
+RoundsCorrection correction_of(const BodyProblem& problem, double enough,
+                               const CorrectionThresholds& thresholds = {});
 
 /// Some contact has it.
 bool has_friction(const BodyProblem& problem);

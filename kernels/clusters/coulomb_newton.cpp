@@ -105,15 +105,16 @@ class CoulombSteps {
     return now;
   }
 
-  std::optional<double> to_come(const Correction& now, const ClusterGoal& goal, double& work) const {
+  std::optional<double> to_come(const Correction& now, double moved, const ClusterGoal& goal,
+                                double& work) const {
     const CoulombThresholds::Known& known = thresholds_.known;
     const double least =
         std::max(static_cast<double>(known.loops), known.looped * static_cast<double>(bodies_of(problem_)));
     if (static_cast<double>(loops_) <= least) return {};
     const double left = known.left * goal.enough, most = known.to_come * goal.enough;
-    if (now.open > left || now.left > left || known.steps * now.moved > most) return {};
+    if (now.open > left || now.left > left || known.steps * moved > most) return {};
     const LinearRest linear = step_.linear_rest(d_, began_, known.firmness, work);
-    const double rest = std::max(known.steps * now.moved, linear.momentum);
+    const double rest = std::max(known.steps * moved, linear.momentum);
     const bool creeps = goal.relative <= known.fine && !(linear.impulse <= known.forces * goal.relative);
     if (creeps || !(rest <= most)) return {};
     return rest;
@@ -122,8 +123,8 @@ class CoulombSteps {
 
   /// Along the last change of the impulses until a contact opens or begins to slide, or one has changed by
   /// the largest. Jammed grains press one another by what redundant contacts take long to let go of: a step
-  /// of firmness 1e9 took a thousandth of it off. Returns how many times the last change that is; 0 for none.
-  double creep_on() {
+  /// of firmness 1e9 took a thousandth of it off. False where less than such a change more leads there.
+  bool creep_on() {
     double length = std::numeric_limits<double>::infinity(), largest = 0, most = 0;
     for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
       const Creep creep = last_change(k);
@@ -137,10 +138,10 @@ class CoulombSteps {
     }
     if (first_largest_ == 0) first_largest_ = largest;
     if (rolling_ || leaps_ >= thresholds_.most_leaps || largest > thresholds_.most_growth * first_largest_)
-      return 0;
-    if (!(most > 0)) return 0;
+      return false;
+    if (!(most > 0)) return false;
     length = std::min(length, largest / most);
-    if (!(length >= 1)) return 0;
+    if (!(length >= 1)) return false;
     ++leaps_;
     for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
       const Creep creep = last_change(k);
@@ -150,7 +151,7 @@ class CoulombSteps {
       if (const double size = t.norm(); size > most_friction) t *= most_friction / size;
       next_.t[k].r = n * problem_.contacts[k].normal + t;
     }
-    return length;
+    return true;
   }
 
  private:
@@ -194,9 +195,9 @@ class CoulombSteps {
 
 }  // namespace
 
-Correction coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
-                              const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
-                              double& work) {
+StepsCorrection coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
+                                   const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
+                                   double& work) {
   CoulombSteps steps(problem, coulomb);
   return search_by_steps(problem, goal, thresholds, coulomb.search, steps, work);
 }

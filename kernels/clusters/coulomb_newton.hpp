@@ -72,8 +72,8 @@ struct CoulombThresholds {
 /// Contacts that press one another harder than they need, as those of grains that fell into a V, let go of it
 /// by rho times a hair's breadth in a step. Between two changes of who sticks, slides or carries all such
 /// steps are alike: the impulses leap to the first of those.
-Correction coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
-                              const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
-                              double& work);
+StepsCorrection coulomb_correction(const BodyProblem& problem, const ClusterGoal& goal,
+                                   const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
+                                   double& work);
 
 }  // namespace talus

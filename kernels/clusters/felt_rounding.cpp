@@ -50,7 +50,7 @@ FeltRounding felt_rounding(const BodyProblem& problem, const ClusterGoal& goal,
   FeltRounding felt{std::vector<double>(problem.bodies.size(), 0.0),
                     std::vector<double>(problem.contacts.size(), 0.0)};
   const ClusterAnswer answer = solve_cluster(problem, goal, thresholds);
-  if (!answer.solved) return felt;
+  if (!answer.solved()) return felt;
   BodyProblem solved = problem;
   for (std::size_t k = 0; k < solved.contacts.size(); ++k) {
     solved.impulse[k] += answer.impulse[k];
@@ -61,7 +61,7 @@ FeltRounding felt_rounding(const BodyProblem& problem, const ClusterGoal& goal,
     for (std::size_t k = 0; k < other.contacts.size(); ++k)
       other.contacts[k].offset += sign[k % 2] * goal.still * other.contacts[k].normal;
     const ClusterAnswer changed = solve_cluster(other, goal, thresholds);
-    if (!changed.solved) continue;
+    if (!changed.solved()) continue;
     // A nearly straight chain is moved by thousands of times what its gaps change by, which is no rounding.
     for (std::size_t b = 0; b < felt.momentum.size(); ++b) {
       const BodyUnknown& body = problem.bodies[b];

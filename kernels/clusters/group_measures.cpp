@@ -43,15 +43,13 @@ Measures measures_of(const BodyProblem& problem, const Vec3& faces) {
 }
 
 double scale_of(const Measures& row, const StepErrorThresholds& thresholds) {
-  // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
-  const double sound = most_momentum(row[MeasureColumn::mass], row[MeasureColumn::incoming]) +
-                       row[MeasureColumn::mass] * row[MeasureColumn::fastest];
-  return std::max(
-      {std::min(row[MeasureColumn::gained], sound),
-       row[MeasureColumn::drive] > 0 ? row[MeasureColumn::mass] * row[MeasureColumn::drive]
-                                     : thresholds.pressed * row[MeasureColumn::pressed],
-       thresholds.held * row[MeasureColumn::pulls],
-       thresholds.rounding * most_momentum(row[MeasureColumn::mass], row[MeasureColumn::incoming])});
+  const MomentumSums sums{.mass = row[MeasureColumn::mass],
+                          .incoming = row[MeasureColumn::incoming],
+                          .exchanged = row[MeasureColumn::gained],
+                          .fastest = row[MeasureColumn::fastest],
+                          .drive = row[MeasureColumn::drive],
+                          .at_rest = thresholds.pressed * row[MeasureColumn::pressed]};
+  return std::max(momentum_scale(sums, thresholds.rounding), thresholds.held * row[MeasureColumn::pulls]);
 }
 
 }  // namespace talus

@@ -3,16 +3,11 @@
 /// What the errors of a cluster, or of bodies that push one another, are compared with.
 
 #include <array>
-#include <cmath>
 
 #include "kernels/clusters/step_error_goal.hpp"
+#include "kernels/global/momentum_scale.hpp"
 
 namespace talus {
-
-/// By Cauchy and Schwarz: the most momentum [N s] in so much energy [J].
-inline double most_momentum(double mass, double energy) {
-  return std::sqrt(mass * energy);
-}
 
 /// What a cluster, or all of them, is measured by.
 struct MeasureColumn {

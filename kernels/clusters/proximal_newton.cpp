@@ -179,9 +179,9 @@ class ProximalSteps {
 
 }  // namespace
 
-Correction proximal_correction(const BodyProblem& problem, const ClusterGoal& goal,
-                               const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
-                               double& work) {
+StepsCorrection proximal_correction(const BodyProblem& problem, const ClusterGoal& goal,
+                                    const CorrectionThresholds& thresholds,
+                                    const ProximalThresholds& proximal, double& work) {
   ProximalSteps steps(problem, goal.still, proximal);
   return search_by_steps(problem, goal, thresholds, proximal.search, steps, work);
 }

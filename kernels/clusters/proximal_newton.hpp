@@ -34,8 +34,8 @@ struct ProximalThresholds {
 /// the next shift s = mu |v_t|, none without friction. For given s steps come as near as need be to an answer
 /// of that convex problem, one near the first t where redundant contacts leave several (Rockafellar 1976). s
 /// follows the velocities (Cadoux 2009); with friction it need not settle.
-Correction proximal_correction(const BodyProblem& problem, const ClusterGoal& goal,
-                               const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
-                               double& work);
+StepsCorrection proximal_correction(const BodyProblem& problem, const ClusterGoal& goal,
+                                    const CorrectionThresholds& thresholds,
+                                    const ProximalThresholds& proximal, double& work);
 
 }  // namespace talus

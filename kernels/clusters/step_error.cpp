@@ -46,16 +46,13 @@ class Answers {
     error.velocity = largest([&](const AnsweredGroup& own) { return velocity_error(own); });
     error.wall = wall_error(goal);
     error.contact = largest(contact_error);
-    const auto any = [&](bool ClusterAnswer::*which, bool value) {
-      return largest([&](const AnsweredGroup& own) {
-               const bool wrong = !(larger(velocity_error(own), contact_error(own)) <= enough);
-               return wrong && own.answer.*which == value ? 1.0 : 0.0;
-             }) > 0;
+    const auto wrong = [&](const AnsweredGroup& own) {
+      return !(larger(velocity_error(own), contact_error(own)) <= enough);
     };
-    error.mends = any(&ClusterAnswer::helps, true);
-    error.solved = !any(&ClusterAnswer::solved, false);
-    error.jammed = any(&ClusterAnswer::jammed, true);
-    error.locked = any(&ClusterAnswer::locked, true);
+    error.mends =
+        largest([&](const AnsweredGroup& own) { return wrong(own) && own.answer.helps ? 1.0 : 0.0; }) > 0;
+    error.worst = static_cast<AnswerState>(largest(
+        [&](const AnsweredGroup& own) { return wrong(own) ? static_cast<double>(own.answer.state) : 0.0; }));
     error.change = changes(&ClusterAnswer::impulse);
     error.moments = changes(&ClusterAnswer::moment);
     error.exchanged = exchanged_;
@@ -92,7 +89,7 @@ class Answers {
 
   double velocity_error(const AnsweredGroup& own) const {
     const double momentum = own.answer.error - own.felt.part_of_motion(own.group.problem, own.answer.motion);
-    if (!own.answer.solved) return larger(thresholds_.unknown, own.scale > 0 ? momentum / own.scale : 0);
+    if (!own.answer.solved()) return larger(thresholds_.unknown, own.scale > 0 ? momentum / own.scale : 0);
     if (momentum <= 0) return 0;
     // Where nothing moves overlaps may still ask for it.
     return own.scale > 0 ? momentum / own.scale : std::numeric_limits<double>::infinity();

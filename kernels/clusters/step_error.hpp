@@ -7,6 +7,7 @@
 #include <span>
 
 #include "kernels/bodies/larger.hpp"
+#include "kernels/clusters/answer_state.hpp"
 #include "kernels/clusters/step_error_goal.hpp"
 #include "kernels/global/body_parts.hpp"
 
@@ -23,10 +24,8 @@ struct StepError {
   PartImpulses change;   ///< of r, per part and contact, that mends it as far as answers help [N s]
   PartImpulses moments;  ///< likewise of moments of rolling resistance [N m s]
   bool mends = false;    ///< of clusters that are wrong by more than what is asked for it mends some
-  bool solved = true;    ///< of all of those an answer was found
-  bool jammed = false;   ///< of one of them there is none: walls close on grains that cannot get away
-  bool locked = false;   ///< of one none was found, and it may be friction that holds its grains there
-  Exchanged exchanged;   ///< by the contacts of all clusters
+  AnswerState worst = AnswerState::found;  ///< what speaks most against an answer of one of those
+  Exchanged exchanged;                     ///< by the contacts of all clusters
 
   /// The worst of all, NaN where one is.
   double relative() const { return larger(larger(velocity, wall), contact); }

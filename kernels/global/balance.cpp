@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/larger.hpp"
 #include "kernels/global/body_solver.hpp"
+#include "kernels/global/momentum_scale.hpp"
 #include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
 
@@ -166,9 +167,6 @@ struct Scale {
   double contacts = 0;  ///< number, of all parts
   double mass = 0;      ///< of its bodies [kg]
   double momentum = 0;  ///< [kg m/s]; 0 where nothing moves
-
-  /// The largest momentum with this energy, by Cauchy and Schwarz.
-  double most(double energy) const { return std::sqrt(mass * energy); }
 };
 
 std::vector<Scale> scales_of(const BodyParts& parts, const BodyGroups& groups,
@@ -201,12 +199,13 @@ std::vector<Scale> scales_of(const BodyParts& parts, const BodyGroups& groups,
   std::vector<Scale> scales;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const double* of = all.data() + width * g;
-    Scale& scale = scales.emplace_back(Scale{of[contacts], of[mass]});
-    // Contacts change no more than the momentum that comes in and what drives, gaps and restitution ask for.
-    const double sound = scale.most(of[incoming]) + of[mass] * of[fastest];
-    scale.momentum = std::max({std::min(exchanged[g], sound),
-                               of[drive] > 0 ? of[mass] * of[drive] : thresholds.interest * of[pressed],
-                               thresholds.rounding * scale.most(of[incoming])});
+    const MomentumSums sums{.mass = of[mass],
+                            .incoming = of[incoming],
+                            .exchanged = exchanged[g],
+                            .fastest = of[fastest],
+                            .drive = of[drive],
+                            .at_rest = thresholds.interest * of[pressed]};
+    scales.push_back({of[contacts], of[mass], momentum_scale(sums, thresholds.rounding)});
   }
   return scales;
 }
@@ -286,7 +285,9 @@ class VelocitySolve {
           parts_.total(groups_.size(), [&](std::size_t p, std::span<double> row) {
             close_open(problems_[p], {p, groups_}, motion[p], wishes_[p], row);
           });
-      const auto pushed = [&](std::size_t g) { return scales_[g].most(kappa_[g] * pushed2[g]); };
+      const auto pushed = [&](std::size_t g) {
+        return most_momentum(scales_[g].mass, kappa_[g] * pushed2[g]);
+      };
       if (small(pushed)) break;
       if (round == 0) continue;
       const std::vector<double> change = distance(parts_, groups_, motion, began);
@@ -331,7 +332,9 @@ class VelocitySolve {
     BodySolver solver(parts_, rho);
     PartField then = motion;
     double energy = solver.begin(force, motion);
-    const auto bound = [&](std::size_t g) { return thresholds_.caution * scales_[g].most(energy); };
+    const auto bound = [&](std::size_t g) {
+      return thresholds_.caution * most_momentum(scales_[g].mass, energy);
+    };
     const auto left = [&](std::size_t g) { return left_[g]; };
     for (std::size_t g = 0; g < left_.size(); ++g) left_[g] = bound(g);
     found_ = momentum(parts_, groups_, motion);

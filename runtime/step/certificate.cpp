@@ -83,7 +83,7 @@ Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, Whole
   if (result_.converged) return Verdict::solved;
   // A NaN fails every comparison above.
   if (std::isnan(result_.error_rms)) return Verdict::not_finite;
-  if (result_.jammed || result_.locked) return Verdict::impossible;
+  if (result_.answers >= AnswerState::locked) return Verdict::impossible;
   // What sweeps do not get at, a direct solve may have found: small clusters are put right before a step is
   // given up.
   if (gives_up && check.corrects && mends_ && correctable()) return Verdict::go_on;
@@ -186,10 +186,8 @@ double Certificate::small_unbalance(WholeProblem& whole) {
     small_known_ = true;
     mends_ = error.mends;
     // Sweeps go on where others can still be put right.
-    result_.jammed = error.jammed && !error.mends;
-    result_.locked = error.locked && !error.mends;
-    result_.unanswered = !error.solved;
-    if (!error.solved) {
+    result_.answers = error.mends ? std::min(error.worst, AnswerState::missing) : error.worst;
+    if (error.worst != AnswerState::found) {
       ++doubts_;
       doubted_at_ = result_.iterations;
     }

@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "kernels/clusters/answer_state.hpp"
 #include "kernels/clusters/clusters.hpp"
 #include "kernels/global/admm.hpp"
 #include "kernels/global/balance.hpp"
@@ -37,12 +38,12 @@ struct IterationResult {
   int corrections = 0;  ///< times that small clusters were put right
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
-  bool diverged = false;    ///< the error grows without bound
-  bool stagnated = false;   ///< more sweeps would not have made the error smaller
-  bool jammed = false;      ///< there is no solution: walls close on grains that cannot get away
-  bool locked = false;      ///< that may be: grains get away, but for friction
-  bool unanswered = false;  ///< how wrong a small cluster is nobody knows: its direct solve found no answer
-  WorstErrors worst;        ///< where it did not converge
+  bool diverged = false;   ///< the error grows without bound
+  bool stagnated = false;  ///< more sweeps would not have made the error smaller
+  /// Of small clusters: what speaks most against an answer of one; as long as others can be put right, no
+  /// more than that it is missing.
+  AnswerState answers = AnswerState::found;
+  WorstErrors worst;  ///< where it did not converge
 };
 
 /// Every number that a verdict depends on, besides the tolerances that the user sets (SolverSettings).
@@ -108,10 +109,9 @@ struct CertificateThresholds {
 /// Of small clusters, the worst.
 struct SmallError {
   double relative = 0;  ///< distance of what the impulses of the last check give from an answer
-  bool solved = true;   ///< answers were found for all that are wrong by more than what was asked for
+  /// Of those that are wrong by more than what was asked for: what speaks most against an answer of one.
+  AnswerState worst = AnswerState::found;
   bool mends = false;   ///< of these some can be put right
-  bool jammed = false;  ///< one has none: no velocities keep its contacts from approaching
-  bool locked = false;  ///< of one none was found, and friction may hold its grains between closing walls
   Exchanged exchanged;  ///< by the contacts of small clusters that nothing else is asked of
 };
 

@@ -254,10 +254,8 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   const bool apart = !twice_ && !knows_more(parameters_);
   small_seconds_ += graph::seconds_now() - began;
   return {.relative = error.relative(),
-          .solved = error.solved,
+          .worst = error.worst,
           .mends = error.mends,
-          .jammed = error.jammed,
-          .locked = error.locked,
           .exchanged = apart ? error.exchanged : Exchanged{}};
 }
 

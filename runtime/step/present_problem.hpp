@@ -29,7 +29,7 @@ class PresentProblem final : public WholeProblem {
   void end() {
     const IterationResult& result = certificate_.result();
     velocity_errors_.swept(result.iterations);
-    answers_.ended(result.unanswered && !result.converged);
+    answers_.ended(result.answers != AnswerState::found && !result.converged);
   }
 
   double plain_sweeps_needed() override;

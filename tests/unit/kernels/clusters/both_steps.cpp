@@ -19,11 +19,11 @@ const Steps both[] = {
     {"Coulomb's law",
      [](const BodyProblem& problem) {
        double work = 1e9;
-       return coulomb_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work);
+       return coulomb_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work).best;
      }},
     {"convex", [](const BodyProblem& problem) {
        double work = 1e9;
-       return proximal_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work);
+       return proximal_correction(problem, {.enough = enough, .relative = 1e-3}, {}, {}, work).best;
      }}};
 
 TEST(BothSteps, AGrainSlidesOrSticksAsCoulombSays) {

@@ -15,7 +15,7 @@ using namespace cluster_makers;
 
 Correction corrected(const BodyProblem& problem) {
   double work = 1e9;
-  return proximal_correction(problem, {.enough = enough}, {}, {}, work);
+  return proximal_correction(problem, {.enough = enough}, {}, {}, work).best;
 }
 
 TEST(ProximalSteps, FindTheForcesInAWedgeHoweverSharpItIs) {
@@ -58,7 +58,7 @@ TEST(ProximalSteps, DoNotShareForcesByWhatRoundingMakesInGaps) {
   for (const bool told : {false, true}) {
     double work = 1e9;
     const Correction answer =
-        proximal_correction(problem, {.enough = enough, .still = told ? 2 * rounding : 0}, {}, {}, work);
+        proximal_correction(problem, {.enough = enough, .still = told ? 2 * rounding : 0}, {}, {}, work).best;
     ASSERT_TRUE(answer.settled);
     EXPECT_NEAR(impulse_of(problem, answer, 0).z(), (told ? 0.45 : 1) * fall, 1e-2 * fall) << told;
     EXPECT_NEAR(impulse_of(problem, answer, 1).z(), (told ? 0.55 : 0) * fall, 1e-2 * fall) << told;
@@ -73,7 +73,7 @@ TEST(ProximalSteps, FindWhoCarriesALidWhereOnlyFirmStepsSeeIt) {
     for (const double lean : {1e-1, 1e-2, 1e-3, 1e-4, 3e-5}) {
       const BodyProblem problem = under_a_lid(lean, apart * lean * lean, give / (lean * lean), 0);
       double work = 1e9;
-      const Correction answer = proximal_correction(problem, {.enough = 2e-4}, {}, {}, work);
+      const Correction answer = proximal_correction(problem, {.enough = 2e-4}, {}, {}, work).best;
       ASSERT_TRUE(answer.settled) << lean << ' ' << give;
       const double a = -impulse_of(problem, answer, 2).z(), b = -impulse_of(problem, answer, 3).z();
       EXPECT_NEAR(a - b, apart, 1e-2) << lean << ' ' << give;
@@ -90,21 +90,21 @@ TEST(ProximalSteps, DoNotTakeForcesWithoutBoundForAnAnswer) {
     problem.contacts.back().offset = -1e-6 * side * Vec3::UnitX();
   }
   double work = 1e9;
-  EXPECT_FALSE(proximal_correction(problem, {.enough = 1e-2}, {}, {}, work).settled);
+  EXPECT_FALSE(proximal_correction(problem, {.enough = 1e-2}, {}, {}, work).best.settled);
   // It is that bound which tells: without it the last step seems to change next to nothing.
   ProximalThresholds boundless;
   boundless.most_growth = 1e300;
-  EXPECT_TRUE(proximal_correction(problem, {.enough = 1e-2}, {}, boundless, work).settled);
+  EXPECT_TRUE(proximal_correction(problem, {.enough = 1e-2}, {}, boundless, work).best.settled);
 }
 
 TEST(ProximalSteps, KeepToTheirWorkAndSaySo) {
   const BodyProblem problem = wedge(1e-3, 0);
   double work = 1;
-  EXPECT_FALSE(proximal_correction(problem, {.enough = enough}, {}, {}, work).settled);
+  EXPECT_FALSE(proximal_correction(problem, {.enough = enough}, {}, {}, work).best.settled);
   EXPECT_LE(work, 0);
   EXPECT_GT(work, -1e4) << "one factorisation of one grain";
   work = 1e9;
-  EXPECT_TRUE(proximal_correction(problem, {.enough = enough}, {}, {}, work).settled);
+  EXPECT_TRUE(proximal_correction(problem, {.enough = enough}, {}, {}, work).best.settled);
   EXPECT_LT(work, 1e9);
   EXPECT_GT(work, 0.9e9);
 }

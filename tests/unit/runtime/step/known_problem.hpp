@@ -37,11 +37,7 @@ class KnownProblem : public WholeProblem {
   SmallError small_error(double enough, int) override {
     const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
     return {std::isnan(error) ? error : std::max(enough, error),
-            !std::isinf(error),
-            mends,
-            jammed,
-            locked,
-            exchanged};
+            std::isinf(error) ? std::max(answers, AnswerState::missing) : answers, mends, exchanged};
   }
   double large_error(double enough) override {
     const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
@@ -52,7 +48,8 @@ class KnownProblem : public WholeProblem {
   WorstErrors worst_errors() override { return {}; }
   std::size_t asked() const { return asked_; }
   std::size_t small_asked() const { return small_asked_; }
-  bool jammed = false, locked = false, mends = false;  ///< what small clusters are besides
+  AnswerState answers = AnswerState::found;  ///< what is known of small clusters besides
+  bool mends = false;
   /// By them: next to nothing; of no mass it is not known.
   Exchanged exchanged = {.energy = 0, .mass = 1e-12};
   std::optional<double> largest_work;  ///< of large clusters, where one is to be weighed by itself
@@ -85,7 +82,8 @@ struct Situation {
   int admm_behind = -1;  ///< check behind which ADMM is called
   std::vector<double> small_errors = {};
   int newton_behind = -1;  ///< check behind which a Newton step is taken
-  bool jammed = false, locked = false, mends = false;
+  AnswerState answers = AnswerState::found;
+  bool mends = false;
   bool corrects = false;  ///< the method puts small clusters right
 };
 
@@ -116,8 +114,7 @@ inline Outcome judged(const Situation& given, const CertificateThresholds& thres
   Certificate certificate(settings, thresholds);
   certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
   KnownProblem problem(given.plain_sweeps, given.velocity_errors, given.small_errors);
-  problem.jammed = given.jammed;
-  problem.locked = given.locked;
+  problem.answers = given.answers;
   problem.mends = given.mends;
   Outcome outcome;
   for (std::size_t k = 0; k < given.checks.size(); ++k) {
