@@ -104,7 +104,7 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   std::vector<double> speeds;
   for (std::size_t k = 0; k < after.u.size(); ++k)
     speeds.push_back(start.before.u[k].norm() + after.u[k].norm());
-  const StepEnd end{mean, run.r, cell.gained, spins, speeds};
+  const StepEnd end{mean, run.r, cell.gained, spins, speeds, step.claimed};
   step.unexplained = disagreement(problem, end);
   if (run.unknown > 0 || !(step.unexplained <= rounding)) {
     step.judged = Judged::other_problem;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "apps/study_certificate/true_errors.hpp"
+#include "apps/study_certificate/unexplained_shift.hpp"
 #include "io/scene/scene.hpp"
 
 namespace talus::audit {

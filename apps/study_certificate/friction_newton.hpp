@@ -18,7 +18,7 @@ struct NewtonResult {
   /// speed of approach, in scaled coordinates.
   double residual = 1;
   /// What one more step would change of the velocities, about their error, and what impulses change of them,
-  /// at least a hundredth of the largest impulse; in the kinetic norm [J^1/2].
+  /// at least 1e-8 of what the largest would; in the kinetic norm [J^1/2].
   double next = 1, exchanged = 1;
 };
 

@@ -54,8 +54,8 @@ struct Reference {
   double residual = 0;  ///< of the law (natural map), the largest, over the run's largest impulse or the
                         ///< largest speed of approach; where there is no answer unavoidable_approach
   /// Error of the velocities in the kinetic norm [J^1/2], a bound without friction, with friction the next
-  /// step of Newton's method; and the norm of what the contacts change, at least a hundredth of the largest
-  /// impulse.
+  /// step of Newton's method; and the norm of what the contacts change, at least the part of the largest
+  /// impulse that each of the two methods grants (floor_of_exchange).
   double error = 0, exchanged = 0;
 
   double uncertainty() const { return exchanged > 0 ? error / exchanged : 0; }

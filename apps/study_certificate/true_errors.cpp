@@ -15,15 +15,12 @@ namespace {
 /// What else errors are compared with at least, as parts of other quantities of the step, and what is no
 /// error: these the judge grants of its own.
 struct Floors {
-  double motion = 1e-9;     ///< of the momentum of all: less is rounding
-  double exchange = 1e-2;   ///< of the momentum exchanged: least wall impulse
-  double contact = 1e-3;    ///< likewise: least contact impulse
-  double load = 1e-2;       ///< of a cluster's weight in a step: least momentum it exchanges
-  double cluster = 1e-9;    ///< of a cluster's own momentum, likewise: grains that graze one another
-  double row = 10;          ///< grains of a cluster beyond which their speeds add up to more
-  double place = 1e-12;     ///< of a grain's distance from the origin and its way: what rounding shifts it by
-  double corrected = 1e-7;  ///< of the largest radius: shifts that a solve of overlaps, an iteration, leaves
-  double undone = 2;        ///< of what is undone of all overlaps: how far that may shift a grain
+  double motion = 1e-9;    ///< of the momentum of all: less is rounding
+  double exchange = 1e-2;  ///< of the momentum exchanged: least wall impulse
+  double contact = 1e-3;   ///< likewise: least contact impulse
+  double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
+  double cluster = 1e-9;   ///< of a cluster's own momentum, likewise: grains that graze one another
+  double row = 10;         ///< grains of a cluster beyond which their speeds add up to more
 };
 constexpr Floors floors;
 constexpr ErrorUnits units;
@@ -74,6 +71,11 @@ struct Momenta {
 double beyond_rounding(const StepProblem& problem, double mass, double error, double times,
                        double felt = INFINITY) {
   return std::max(0.0, error - times * std::min(felt, mass * problem.rounding_speed));
+}
+
+/// Of which the part that is claimed is what rounding is excused for [m/s].
+double least_known_speed(const StepProblem& problem, const StepEnd& end) {
+  return excused_roundings * problem.rounding_speed / end.claimed;
 }
 
 /// Per grain: how many speeds that rounding makes its own may be off by. A row adds up those of its grains,
@@ -137,10 +139,10 @@ std::vector<double> cluster_masses(const StepProblem& problem) {
 /// Of the bodies that push one another, in the exact answer or as the run says, where the momentum error is
 /// largest against what they exchange. Contacts that carry nothing would hide a column beside what is fast.
 double worst_cluster(const StepProblem& problem, const Momenta& momentum, const Reference& reference,
-                     std::span<const Vec3> run) {
+                     const StepEnd& end) {
   const std::vector<Vec3>& exact = reference.r;
   const std::vector<std::size_t> set = joined_bodies(problem, [&](std::size_t c) {
-    return exact[c] != Vec3::Zero() || reference.exact[c] != Vec3::Zero() || run[c] != Vec3::Zero();
+    return exact[c] != Vec3::Zero() || reference.exact[c] != Vec3::Zero() || end.r[c] != Vec3::Zero();
   });
   struct Sums {
     double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0, drive = 0, held = 0;
@@ -170,7 +172,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
     if (problem.cell.follows() && !contact.at_wall()) add(momentum.wrong.size() - 1);
     if (contact.at_wall() && !contact.is_moment())
       own.wall_impulse = std::max(own.wall_impulse, (exact[c] - contact.pull * contact.normal).norm());
-    if (!contact.is_moment() && (exact[c] != Vec3::Zero() || run[c] != Vec3::Zero()))
+    if (!contact.is_moment() && (exact[c] != Vec3::Zero() || end.r[c] != Vec3::Zero()))
       own.drive = std::max(own.drive, drive_at(problem, contact));
   }
   double worst = 0;
@@ -178,9 +180,10 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, const 
   const double elsewhere = units.elsewhere * momentum.all_exchanged() /
                            std::accumulate(problem.mass.begin(), problem.mass.end(), 1e-300);
   for (const Sums& own : sums) {
-    const double unit = std::max({own.exchanged, units.walls * own.wall_impulse, own.mass * own.drive,
-                                  floors.load * own.mass * weight, floors.cluster * own.momentum,
-                                  own.mass * elsewhere, units.held * own.held, 1e-300});
+    const double unit =
+        std::max({own.exchanged, units.walls * own.wall_impulse, own.mass * own.drive,
+                  floors.load * own.mass * weight, floors.cluster * own.momentum, own.mass * elsewhere,
+                  own.mass * least_known_speed(problem, end), units.held * own.held, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;
@@ -264,7 +267,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   }
   for (const StepContact& contact : problem.contacts) held += contact.pull;
   const double exchange = std::max({momentum.all_exchanged(), units.walls * felt, mass * problem.drive_speed,
-                                    floors.motion * mass * speed, units.held * held, 1e-300});
+                                    floors.motion * mass * speed, mass * least_known_speed(problem, end),
+                                    units.held * held, 1e-300});
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     if (problem.contacts[c].is_moment()) continue;
     contact_unit = std::max(contact_unit, reference.r[c].norm());
@@ -275,7 +279,7 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);
   errors.contact_force = contact_wrong / std::max(contact_unit, floors.contact * exchange);
-  errors.cluster = worst_cluster(problem, momentum, reference, end.r);
+  errors.cluster = worst_cluster(problem, momentum, reference, end);
   return errors;
 }
 
@@ -355,40 +359,6 @@ double energy_gain(const StepProblem& problem, const Frame& before, const Frame&
   }
   free += std::pow(units.walls * wall_impulse, 2) / (2 * mass);
   return free > 0 ? std::max(0.0, gained - fall) / free : 0;
-}
-
-UnexplainedShift unexplained_shift(const StepInput& input, double part, const Frame& after) {
-  if (input.before.domain.repeats) return {};
-  const Frame& before = input.before;
-  const double h = input.stage.time_step;
-  const std::size_t grains = after.x.size();
-  std::vector<Vec3> middle, moved;
-  double way = 0, size = 0, largest = 0, overlaps = 0;
-  for (std::size_t k = 0; k < grains; ++k) {
-    middle.push_back(before.x[k] + h / 2 * before.u[k]);
-    moved.push_back(middle[k] + h / 2 * after.u[k]);
-    way = larger(way, (after.x[k] - moved[k]).norm());
-    largest = std::max(largest, after.radius[k]);
-    size = std::max(size, after.x[k].norm() + (moved[k] - before.x[k]).norm());
-  }
-  for (std::size_t i = 0; i < grains && part > 0; ++i)
-    for (std::size_t j = 0; j < i; ++j) {
-      const double least = std::min((middle[i] - middle[j]).norm(), (moved[i] - moved[j]).norm());
-      overlaps += std::max(0.0, after.radius[i] + after.radius[j] - least);
-    }
-  for (std::size_t w = 0; w < input.walls.size() && part > 0; ++w) {
-    const StepWall wall(input.walls[w], before.time, h);
-    if (!wall.there()) continue;
-    Placement half = wall.placed(h / 2), end = wall.placed(h);
-    if (!wall.moves()) {  // a load may have changed its speed
-      end.shift = (after.walls[w].position - before.walls[w].position) * input.walls[w].normal;
-      half.shift = end.shift / 2;
-    }
-    for (std::size_t i = 0; i < grains; ++i)
-      overlaps += std::max(wall.overlap(middle[i], after.radius[i], half),
-                           wall.overlap(moved[i], after.radius[i], end));
-  }
-  return {way, part * (floors.undone * overlaps + floors.corrected * largest) + floors.place * size};
 }
 
 }  // namespace talus::audit

@@ -24,7 +24,8 @@ struct ErrorUnits {
 /// be the momentum that the contacts exchange in the exact answer, sum m |u* - u_free| over grains, pushed
 /// walls and a cell that follows a stress, but at least 10⁻⁸ of the largest wall impulse (grains
 /// pressed between fixed walls gain nothing), and what the speed of a driven wall, or of a
-/// driven flow over a diameter, gives to all.
+/// driven flow over a diameter, gives to all; and at least so much that what rounding is excused for is no
+/// more of it than StepEnd::claimed.
 struct TrueErrors {
   double velocity = 0;  ///< V: sum m |u - u*| over E
   /// wf: largest error of a wall's impulse over the largest wall impulse or load (where cohesion holds grains
@@ -46,6 +47,9 @@ struct StepEnd {
   /// Speeds of the grains before the step and after it, together [m/s]: what rounding is a part of, though
   /// velocities that an impact turns round have a mean of 0. Empty: those of the problem are as large.
   std::span<const double> speeds = {};
+  /// The relative error that the step claims. Where that part of what bodies exchange is less than what
+  /// rounding of positions is excused for, no answer is known as well as it.
+  double claimed = INFINITY;
 };
 
 /// w of Motion that the run's grains have in the axes of the middle of the step, in the terms of the problem;
@@ -79,17 +83,5 @@ double disagreement(const StepProblem& problem, const StepEnd& end);
 /// with at least (ErrorUnits::walls). Heights change by the motion: what `overlap_correction` shifts sets
 /// nothing in motion and does not count.
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
-
-/// How far a grain is from where its velocities take it, and what may shift it that far.
-struct UnexplainedShift {
-  double way = 0;      ///< the largest |x+ - x- - h (u- + u+)/2| [m]
-  double granted = 0;  ///< [m]
-  bool within(double times) const { return way <= times * granted; }  ///< false also where it is no number
-};
-
-/// Granted are `part` (`overlap_correction`) of the overlaps in the middle of the step, from where grains
-/// rebound, or that the velocities would leave at its end, twice their sum, and rounding. Nothing is asked in
-/// a cell, where positions wrap. `input`: the step without what happens in it.
-UnexplainedShift unexplained_shift(const StepInput& input, double part, const Frame& after);
 
 }  // namespace talus::audit

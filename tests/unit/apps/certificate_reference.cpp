@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -281,6 +282,28 @@ TEST(CertificateErrors, OfAnAnswerAreNoneAndOfHalfTheForcesAHalf) {
   EXPECT_NEAR(some.wall_force, 0.5, 1e-9);
   EXPECT_NEAR(some.contact_force, 0.5, 1e-9);
   EXPECT_NEAR(some.cluster, 0.5, 1e-9);
+}
+
+// A grain that gains a hundred roundings of positions is known to a twentieth: a claim of a thousandth says
+// nothing of it until it is off by many.
+TEST(CertificateErrors, OfWhatIsKnownWorseThanTheClaimAreLeftOut) {
+  const Step step = wedge(0.1);
+  StepProblem problem = step.problem();
+  const Reference answer = solved(problem);
+  problem.rounding_speed = g * h / 100;
+  constexpr double claimed = 1e-3;
+  const auto worst = [&](double roundings, double claim) {
+    std::vector<Vec3> r = answer.r;
+    for (Vec3& impulse : r) impulse *= 1 - roundings / 100;
+    const Frame after = ended(problem, step, r);
+    StepEnd end{after, r};
+    end.claimed = claim;
+    const TrueErrors errors = true_errors(problem, answer, end);
+    return std::array{std::min(errors.velocity, errors.cluster), std::max(errors.velocity, errors.cluster)};
+  };
+  EXPECT_GT(worst(8, 0.1)[0], 0.02) << "beyond the five that are excused";
+  EXPECT_LT(worst(8, claimed)[1], claimed);
+  EXPECT_GT(worst(50, claimed)[0], 5 * claimed);
 }
 
 TEST(CertificateErrors, OfAContactInARowAreNotWhatRoundingMakesOfItsGrains) {
