@@ -100,6 +100,9 @@ trace::Trace report(const ReplayOptions& options, const trace::Timeline& timelin
   return std::move(played.trace);
 }
 
+/// Of --steps: times of more would no longer be whole in double precision.
+constexpr double most_steps = 1e15;
+
 }  // namespace
 
 int replay_command(ReplayOptions options) {
@@ -110,7 +113,6 @@ int replay_command(ReplayOptions options) {
     const std::string& file = options.smpi_platform;
     io::check_output_files({options.file}, {options.out, file, file.empty() ? "" : file + ".hosts"},
                            options.force);
-    constexpr double most_steps = 1e15;
     if (options.steps && !(*options.steps >= 1 && *options.steps <= most_steps))
       throw std::invalid_argument(
           fmt::format("--steps must be 1 to {:g}, got {}", most_steps, *options.steps));

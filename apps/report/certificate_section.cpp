@@ -47,8 +47,8 @@ io::HtmlFigure bounded_figure(const RunFolder& run, const Bounded& what) {
 }
 
 std::string verdict(const RunFolder& run, std::size_t steps, std::size_t missed) {
-  if (missed == 0) return fmt::format("All {} steps are within their tolerances.", steps);
-  std::string text = fmt::format("{} of {} steps missed a tolerance. ", missed, steps);
+  std::string text = certificate_sentence(steps, missed);
+  if (missed == 0) return text;
   const auto &time = run.steps["time"], &converged = run.steps["converged"];
   std::string first, last;
   for (std::size_t k = 0; k < converged.size(); ++k)
@@ -56,8 +56,8 @@ std::string verdict(const RunFolder& run, std::size_t steps, std::size_t missed)
       last = fmt::format("{:.4g} s", time[k]);
       if (first.empty()) first = last;
     }
-  text += first == last ? fmt::format("It ended at {}. ", first)
-                        : fmt::format("The first ended at {}, the last at {}. ", first, last);
+  text += first == last ? fmt::format(" It ended at {}. ", first)
+                        : fmt::format(" The first ended at {}, the last at {}. ", first, last);
   return text +
          "The column `converged` of steps.csv names each; worst_* and overlap_* name its worst contact and "
          "bodies.";
@@ -75,6 +75,12 @@ double velocity_allowed(const RunFolder& run) {
 }
 
 }  // namespace
+
+std::string certificate_sentence(std::size_t steps, std::size_t missed) {
+  if (steps == 0) return "No step has ended.";
+  if (missed == 0) return fmt::format("All {} steps are within their tolerances.", steps);
+  return fmt::format("{} of {} steps missed a tolerance.", missed, steps);
+}
 
 HtmlSections certificate_section(const RunFolder& run) {
   const auto& converged = run.steps["converged"];

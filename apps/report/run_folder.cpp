@@ -37,9 +37,8 @@ void demand_all_steps(const RunFolder& run) {
   if (status == "running" || rows == told || (status == "failed" && rows > told)) return;
   throw io::FileError(
       (run.directory / "steps.csv").string(),
-      fmt::format("has {} whole rows with column `converged`, run.json beside it speaks of {} "
-                  "steps: restore the one that has been changed, or run the scene anew in "
-                  "another directory",
+      fmt::format("has {} whole rows with column `converged`, run.json beside it speaks of {} steps: restore "
+                  "the one that has been changed, or run the scene anew in another directory",
                   rows, told));
 }
 

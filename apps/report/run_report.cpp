@@ -20,9 +20,7 @@ using Kind = io::HtmlNotice::Kind;
 io::HtmlNotice notice_of(const RunFolder& run) {
   const auto& converged = run.steps["converged"];
   const auto missed = std::count(converged.begin(), converged.end(), 0.0);
-  std::string certificate = fmt::format("{} of {} steps missed a tolerance.", missed, converged.size());
-  if (missed == 0) certificate = fmt::format("All {} steps are within their tolerances.", converged.size());
-  if (converged.empty()) certificate = "No step has ended.";
+  const std::string certificate = certificate_sentence(converged.size(), static_cast<std::size_t>(missed));
   const std::string status = run.summary.value("status", "running");
   const std::string message = run.summary.value("message", "");
   const std::string said = message.empty() ? "" : " (" + message + ")";

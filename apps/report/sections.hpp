@@ -18,6 +18,8 @@ using HtmlSections = std::vector<io::HtmlSection>;
 
 HtmlSections scene_section(const RunFolder& run);
 HtmlSections certificate_section(const RunFolder& run);
+/// How many of the steps missed a tolerance.
+std::string certificate_sentence(std::size_t steps, std::size_t missed);
 HtmlSections experiment_sections(const RunFolder& run);
 /// Of cell.csv: stresses, solid fraction, coordination and inertial number of a periodic cell.
 HtmlSections cell_section(const RunFolder& run);

@@ -51,12 +51,15 @@ std::vector<T> or_else(const std::vector<T>& given, std::vector<T> otherwise) {
   return given.empty() ? otherwise : without_repeats(given);
 }
 
+/// Of a whole run that neither the command nor the scene bounds by a number of steps.
+constexpr std::int64_t default_steps = 20;
+
 StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   StudyPlan plan;
   plan.tolerances = descending(options.tolerances, {1e-2, 1e-3, 1e-4});
   plan.time_steps = descending(options.time_steps, {1});
   plan.at_step = options.at_step;
-  plan.steps = options.steps.value_or(20);
+  plan.steps = options.steps.value_or(default_steps);
   plan.max_sweeps = options.max_sweeps;
   plan.max_seconds = options.max_seconds;
   const std::vector<std::string> methods = or_else(options.methods, talus::methods().names());

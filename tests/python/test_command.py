@@ -176,16 +176,19 @@ def test_progress_is_told(heap, tmp_path):
     assert steps and steps == sorted(steps) and all("heartbeat" in status for status in told)
 
 
-def test_an_interrupt_stops_the_run_behind_a_checkpoint(heap, tmp_path):
-    heap["stage"][0]["end"]["steps"] = 10**9
-
+def interrupt_this_process_behind_a_checkpoint_of(run):
     def interrupt():
         deadline = time.monotonic() + 60
-        while time.monotonic() < deadline and not list((tmp_path / "run").glob("checkpoint_*.h5")):
+        while time.monotonic() < deadline and not list(run.glob("checkpoint_*.h5")):
             time.sleep(0.05)
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Thread(target=interrupt).start()
+
+
+def test_an_interrupt_stops_the_run_behind_a_checkpoint(heap, tmp_path):
+    heap["stage"][0]["end"]["steps"] = 10**9
+    interrupt_this_process_behind_a_checkpoint_of(tmp_path / "run")
     with pytest.raises(KeyboardInterrupt):
         talus.run(heap, tmp_path / "run", threads=1, progress=False)
     run = talus.open(tmp_path / "run")
@@ -195,14 +198,7 @@ def test_an_interrupt_stops_the_run_behind_a_checkpoint(heap, tmp_path):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_interrupt_of_this_process_alone_stops_all_runs_of_a_sweep(heap, tmp_path, jobs):
     out = tmp_path / "sweep"
-
-    def interrupt():
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline and not list((out / "001").glob("checkpoint_*.h5")):
-            time.sleep(0.05)
-        os.kill(os.getpid(), signal.SIGINT)
-
-    threading.Thread(target=interrupt).start()
+    interrupt_this_process_behind_a_checkpoint_of(out / "001")
     with pytest.raises(KeyboardInterrupt):
         talus.sweep(heap, out, {"stage.0.end.steps": [3, 10**9, 10**8]}, jobs=jobs)
     assert [talus.open(out / run).status for run in ("000", "001")] == ["done", "stopped"]

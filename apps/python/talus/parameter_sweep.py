@@ -147,7 +147,7 @@ def sweep(
     def one(changed: Scene, directory: Path) -> RunError | None:
         try:
             run(changed, directory, ranks=ranks, threads=threads, resume=resume, force=force,
-                      options=options, progress=progress, program=program, _stop=stop)
+                options=options, progress=progress, program=program, _stop=stop)
         except RunError as error:
             return error
         return None

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <system_error>
 
 #include "io/scene/detail/foreign_words.hpp"
@@ -14,13 +15,24 @@ namespace talus::io::detail {
 
 namespace {
 
+/// A text as a number, which it is from its first to its last letter.
+struct TextAsNumber {
+  bool is_number = false;  ///< also where no double holds it
+  std::optional<double> value = {};
+};
+TextAsNumber as_number(const std::string& text) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (end != text.data() + text.size() || error == std::errc::invalid_argument) return {};
+  if (error != std::errc{}) return {true};
+  return {true, number};
+}
+
 std::string found_text(const toml::node& node) {
   if (const auto* text = node.as_string()) {
     const std::string& held = text->get();
-    double number = 0;
-    const auto [end, error] = std::from_chars(held.data(), held.data() + held.size(), number);
     // TOML's reader refuses such a number, so that an override with one is a text.
-    if (error == std::errc::result_out_of_range && end == held.data() + held.size())
+    if (const TextAsNumber number = as_number(held); number.is_number && !number.value)
       return held + ", which is out of the range of numbers";
     return fmt::format("the text '{}'", held);
   }
@@ -37,11 +49,8 @@ std::string found_text(const toml::node& node) {
 std::string number_meant(const toml::node& node) {
   const auto* text = node.as_string();
   if (text == nullptr) return "";
-  const std::string& held = text->get();
-  double number = 0;
-  const auto [end, error] = std::from_chars(held.data(), held.data() + held.size(), number);
-  const bool means = error == std::errc{} && end == held.data() + held.size() && std::isfinite(number);
-  return means ? ": write " + toml_text(number) : "";
+  const std::optional<double> number = as_number(text->get()).value;
+  return number && std::isfinite(*number) ? ": write " + toml_text(*number) : "";
 }
 
 /// Products of numbers of these units have to stay numbers, as those of pressures and areas.
