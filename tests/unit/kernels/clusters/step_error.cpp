@@ -72,6 +72,15 @@ TEST(StepError, OfAForceOnAFastWallIsFound) {
   }
 }
 
+// A grain went on into a wall, beside others in a drum: a millionth of the drum's speed counted for it, too.
+TEST(StepError, OfAColumnIsNotHiddenByAFastWallBesideIt) {
+  BodyProblem problem;
+  add_column(problem, 3, 0, 0.7);
+  add_column(problem, 1, 1, 1);
+  problem.contacts.back().drive = 1e9 * fall;
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4}).velocity, 0.3 / 0.7, 1e-3);
+}
+
 TEST(StepError, OfAColumnIsNotHiddenByGrainsAtRestBesideIt) {
   BodyProblem problem;
   add_column(problem, 50, 0, 0.7);
