@@ -75,7 +75,21 @@ std::string failure_message(const CLI::App* of, const CLI::Error& error) {
         what = fmt::format("{} has no option {}{}", command, word, option_hint(*app, word));
         break;
       }
+  // CLI11's words for numbers that are none, or not whole, or beyond their range.
+  if (const std::string words = "Could not convert: "; what.starts_with(words))
+    what = what.substr(words.size()) + " is no number of the kind that is asked for";
   return fmt::format("talus: error: {}; `{} --help` lists what there is\n", what, command);
+}
+
+/// An empty value is what a variable of a script that is not set leaves: no file and no directory is meant.
+void refuse_empty_values(CLI::App& app) {
+  for (CLI::Option* option : app.get_options({}))
+    if (option->get_expected_max() > 0)
+      option->check(CLI::Validator(
+          [](const std::string& value) {
+            return std::string(value.empty() ? "the value is empty: give one, or leave the option out" : "");
+          },
+          ""));
 }
 
 /// A command that CLI11 knows, and what runs it.
@@ -102,6 +116,7 @@ void add_commands(CLI::App& parent, const std::vector<Command>& table, std::vect
     CLI::App* app = parent.add_subcommand(command.name, command.sentence);
     if (command.add_options) {
       added.push_back({app, command.add_options(*app)});
+      refuse_empty_values(*app);
     } else {
       app->require_subcommand(1);
       add_commands(*app, command.subcommands, added);

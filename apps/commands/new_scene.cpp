@@ -26,11 +26,14 @@ const SceneKind& kind_of(const std::string& name) {
 
 /// The texts of all kinds are sound, so that only the name can be wrong.
 void demand_name(const std::string& name, const std::string& text) {
+  if (name.ends_with(".toml"))
+    throw std::invalid_argument(
+        fmt::format("the file of a scene '{0}' would be {0}.toml: leave .toml out of the name", name));
   try {
     io::parse_scene(text, name);
   } catch (const std::exception&) {
-    throw std::invalid_argument(
-        fmt::format("no scene can be called '{}': a name is made of letters, digits, +, - and _", name));
+    throw std::invalid_argument(fmt::format(
+        "no scene can be called '{}': a name is made of at most 100 letters, digits, +, - and _", name));
   }
 }
 

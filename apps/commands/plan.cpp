@@ -58,12 +58,13 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
        turning               ? "tangential impulses turn the grains"
        : parameters.friction ? "rotation = false"
                              : "nothing turns grains without friction");
-  line("free angular velocities", !state.free.w.empty(),
-       state.free.w.empty() ? "no grain turns" : "24 bytes per grain");
-  line("orientations", !state.bodies.orientation.empty(),
-       state.bodies.orientation.empty() ? "spheres need none; not asked for"
-       : parameters.clumps              ? "clumps have them: 32 bytes per grain"
-                                        : "asked for: 32 bytes per grain");
+  line("free angular velocities", turning || !state.free.w.empty(),
+       turning || !state.free.w.empty() ? "24 bytes per grain" : "no grain turns");
+  const bool oriented = !state.bodies.orientation.empty() || scene.setup.orientation;
+  line("orientations", oriented,
+       !oriented           ? "spheres need none; not asked for"
+       : parameters.clumps ? "clumps have them: 32 bytes per grain"
+                           : "asked for: 32 bytes per grain");
   const bool single = !state.single.velocity.empty();
   line("sweeps in double", !single,
        single ? "single precision until the error is small: half the bytes and divisions"
@@ -110,6 +111,10 @@ void print_costs(const Simulation& simulation) {
       state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * 8);
   const double of_contacts = static_cast<double>(memory_used(state)) - of_bodies;
   const auto copies = static_cast<std::int64_t>(state.bodies.size()) - simulation.bodies();
+  if (simulation.bodies() == 0)
+    print_out(
+        "\n  no grains yet: what they will need in memory, tasks and precision is not known; begin from a "
+        "state to see it\n");
   print_out("\n  {} grains{}, {} candidates, {} contacts in {} chunks of {} colours\n", simulation.bodies(),
             copies > 0 ? fmt::format(" and {} copies of them in other subdomains", copies) : "",
             state.candidates.size(), simulation.report().contacts, state.chunks.size(), state.chunks.colours);
@@ -156,6 +161,9 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
     }
     constexpr int repeats = 3;
     if (options.measure) print_savings(measure_savings(scene, threads, repeats, ranks), threads, repeats);
+  } catch (const NothingToMeasure& error) {
+    print_error("talus: error: {}: {}\n", options.scene, error.what());
+    return exit_bad_input;
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_failure;

@@ -93,12 +93,14 @@ class Forms {
   Setup friction(bool in) const {
     Setup setup = base_;
     PairTable& laws = setup.stages.front().laws;
-    if (!in)
+    if (!in) {
       laws.set_all(&PairLaw::friction, 0);
-    else if (laws.largest(&PairLaw::friction) == 0)
+      laws.set_all(&PairLaw::rolling_resistance, 0);  // nothing rolls without friction
+    } else if (laws.largest(&PairLaw::friction) == 0)
       laws.between(material_of_grains, material_of_grains).friction = friction_put_in;
     return setup;
   }
+  const Setup& as_it_is() const { return base_; }
   Setup rotation(bool in) const {
     Setup setup = friction(true);
     setup.rotation = in;
@@ -169,6 +171,11 @@ std::vector<MeasuredSaving> measure_savings(const io::Scene& scene, int threads,
   append(build_sample(turning), bodies);
   const Forms forms(scene, bodies);
   graph::Executor executor({.threads = threads});
+  if (bodies.size() == 0 || sweep_first_step(forms.as_it_is(), bodies, executor).ns == 0)
+    throw NothingToMeasure(
+        "--measure: nothing is swept in the first step, as no grains press one another or a wall there: "
+        "begin "
+        "from a state in which they do ([sample] kind = \"state\")");
   std::vector<MeasuredSaving> savings;
   const auto add = [&](const char* part, bool in_scene, Setup (Forms::*form)(bool) const) {
     const auto [with, without] =

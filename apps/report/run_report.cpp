@@ -24,7 +24,14 @@ io::HtmlNotice notice_of(const RunFolder& run) {
   const std::string status = run.summary.value("status", "running");
   const std::string message = run.summary.value("message", "");
   const std::string said = message.empty() ? "" : " (" + message + ")";
-  if (status == "failed") return {Kind::bad, "The run failed" + said + ". " + certificate};
+  if (status == "failed") {
+    const auto told = run.summary.value("steps", std::int64_t{0});
+    const std::string lacking =
+        told > std::ssize(converged)
+            ? fmt::format(" steps.csv has {} of its {} steps.", converged.size(), told)
+            : "";
+    return {Kind::bad, "The run failed" + said + ". " + certificate + lacking};
+  }
   const Kind kind = missed > 0 ? Kind::warning : Kind::good;
   if (status == "stopped")
     return {Kind::warning, "The run was stopped" + said + "; --resume goes on. " + certificate};

@@ -109,7 +109,7 @@ std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std
     return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)},
                    stand);
   } catch (const std::invalid_argument& error) {
-    throw io::error_in(scene, fmt::format("sample[{}].count", k), error.what());
+    throw io::error_in(scene, io::key_of_sample(scene, k) + ".count", error.what());
   }
 }
 
@@ -145,7 +145,7 @@ Sample make_part(const io::Scene& scene, std::size_t k, std::span<const Sample> 
     sample.radius = draw(static_cast<std::size_t>(spec.count));
     sample.x = random_places(scene, k, sample.radius, before);
   } else if (spec.region) {
-    sample.x = sites_in_region(scene, spec, fmt::format("sample[{}].region", k));
+    sample.x = sites_in_region(scene, spec, io::key_of_sample(scene, k) + ".region");
     sample.radius = draw(sample.x.size());
   } else {
     demand_memory(scene, static_cast<double>(spec.grains()));

@@ -40,7 +40,7 @@ void refuse_overlaps(const io::Scene& scene, const Sample& sample, const std::ve
   }
   if (count == 0) return;
   throw io::error_in(
-      scene, fmt::format("sample[{}]", part_of[at(deepest.second)]),
+      scene, io::key_of_sample(scene, part_of[at(deepest.second)]),
       fmt::format(
           "samples {} and {} overlap: {} pairs of grains of different samples, the deepest by {:.3g} m. "
           "Move one of them (origin, position, region), or make it smaller",

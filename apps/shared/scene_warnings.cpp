@@ -95,12 +95,14 @@ double latest_end(const io::Scene& scene, const std::string& only) {
 /// What is to happen when the run has ended. What is due at its very end would come in the step after it.
 void add_late(const io::Scene& scene, std::vector<std::string>& warnings) {
   constexpr double rounding = 1e-9;
-  for (const RemoveRule& rule : scene.setup.removes)
-    if (const double end = latest_end(scene, rule.times.stage);
-        !rule.at.empty() && rule.at.back() >= end * (1 - rounding))
-      warnings.push_back(fmt::format("remove '{}': at = {:g} s is never reached: {} ends by {:g} s",
-                                     rule.name, rule.at.back(),
+  for (const RemoveRule& rule : scene.setup.removes) {
+    const double end = latest_end(scene, rule.times.stage);
+    const double last = rule.at.empty() ? rule.times.from : rule.at.back();
+    if (last > 0 && last >= end * (1 - rounding))
+      warnings.push_back(fmt::format("remove '{}': {} = {:g} s is never reached: {} ends by {:g} s",
+                                     rule.name, rule.at.empty() ? "from" : "at", last,
                                      rule.times.stage.empty() ? "the run" : "its stage", end));
+  }
   const double end = latest_end(scene, "");
   for (const ProbeRule& rule : scene.setup.probes)
     if (rule.every && !rule.every_steps && *rule.every > end * (1 + rounding))

@@ -46,6 +46,40 @@ void relate(std::vector<ScalingRow>& rows) {
   }
 }
 
+std::vector<std::string> doubts_about(const std::vector<ScalingRow>& rows,
+                                      const DoubtThresholds& thresholds) {
+  std::vector<std::string> doubts;
+  const ScalingRow* best = nullptr;
+  for (const ScalingRow& row : rows)
+    if (row.efficiency > (best ? best->efficiency : thresholds.efficiency)) best = &row;
+  if (best)
+    doubts.push_back(
+        fmt::format("efficiency {:.2g} of {} scaling on {} cores is more than cores have: the time on one "
+                    "was disturbed, or "
+                    "parts of the sample do other work than all of it (clusters of up to 200 bodies are "
+                    "solved directly); "
+                    "--record 3 --typical, or more grains",
+                    best->efficiency, name_of(best->kind), best->cores()));
+  for (const ScalingRow& row : rows) {
+    if (row.kind != ScalingKind::strong || !row.predicted() || row.cores() != 1 || row.subdomains != 1)
+      continue;
+    const auto measured = std::ranges::find_if(rows, [&](const ScalingRow& other) {
+      return !other.predicted() && other.kind == row.kind && other.variant == row.variant &&
+             other.cores() == 1 && other.subdomains == 1;
+    });
+    if (measured == rows.end()) continue;
+    const double ratio = row.seconds / measured->seconds;
+    if (ratio <= thresholds.one_core && ratio >= 1 / thresholds.one_core) continue;
+    doubts.push_back(
+        fmt::format("a step on one core is predicted to take {:.3g} s and takes {:.3g} s: the recording was "
+                    "disturbed, and "
+                    "what follows from it is as wrong; --record 3 --typical on a quiet machine",
+                    row.seconds, measured->seconds));
+    break;
+  }
+  return doubts;
+}
+
 std::string bound_of(const ScalingRow& row) {
   struct Factor {
     double value;

@@ -64,6 +64,18 @@ struct ScalingRow {
 /// variant. Rows without such a row keep NaN.
 void relate(std::vector<ScalingRow>& rows);
 
+/// Beyond these figures cannot be right. Ratios have no unit.
+struct DoubtThresholds {
+  double efficiency = 1.3;  ///< of a row, > 1: caches of more cores give some
+  double one_core = 1.3;    ///< time predicted for one core over the measured one, or the inverse, > 1
+};
+
+/// What says that times are not comparable: a sentence for the highest efficiency that no machine has, and
+/// one for a prediction of one core that its measurement refutes. Empty where there is nothing. `rows`:
+/// related.
+std::vector<std::string> doubts_about(const std::vector<ScalingRow>& rows,
+                                      const DoubtThresholds& thresholds = {});
+
 /// The factor that costs most, with its value: "more iterations (0.93)"; "" when nothing is known, "nothing"
 /// when all factors are above 0.995.
 std::string bound_of(const ScalingRow& row);

@@ -219,6 +219,7 @@ int run_study(const StudyScalingOptions& options) {
     run_weak(options, prepared, study);
   else if (!options.no_weak)
     say(fmt::format("no weak scaling: the sample cannot grow, since {}", prepared.no_weak));
+  for (const std::string& doubt : doubts_about(study.rows())) say("warning: " + doubt);
   say(fmt::format("tables, pictures, traces and report.html in {}", directory));
   const std::size_t over = rows_over_tolerance(prepared.allow_unconverged, study.rows());
   if (over == 0) return exit_done;

@@ -126,6 +126,8 @@ struct Scene {
 
 /// What is wrong with the scene, at the line of `key`, or of what the message names; `key` may be empty.
 SceneError error_in(const Scene& scene, const std::string& key, const std::string& message);
+/// Of `samples[k]`, as the file writes it: [sample], or one of [[sample]].
+std::string key_of_sample(const Scene& scene, std::size_t k);
 
 /// Reads a scene. `overrides` are texts "a.b=c" applied in order: the value is read as TOML, or taken as a
 /// text if it is none; an element of an array is named by its number or its name (stage.0.time_step,

@@ -42,6 +42,10 @@ int line_of(const ScenePlaces& places, const std::string& key, const std::string
   return named;
 }
 
+std::string key_of_sample(const Scene& scene, std::size_t k) {
+  return scene.places.contains("sample[0]") ? "sample[" + std::to_string(k) + "]" : "sample";
+}
+
 SceneError error_in(const Scene& scene, const std::string& key, const std::string& message) {
   return {scene.source_file, line_of(scene.places, key, message), key, message};
 }

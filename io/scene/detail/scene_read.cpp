@@ -86,6 +86,14 @@ struct Reader {
         real != nullptr && real->get() == std::round(real->get()))
       fail_at(node, path,
               fmt::format("expected {}, got {}: write {:.0f}", expected, found_text(node), real->get()));
+    // TOML's reader refuses such a number, too, so that an override with one is a text.
+    constexpr auto most = static_cast<double>(std::numeric_limits<std::int64_t>::max());
+    if (const auto* text = node.as_string())
+      if (const TextAsNumber number = as_number(text->get());
+          number.is_number && std::abs(number.value.value_or(most)) >= most)
+        fail_at(
+            node, path,
+            fmt::format("expected {}, got {}, which is out of the range of integers", expected, text->get()));
     if (!node.is_integer()) wrong_type(node);
     return within_range(node, node.as_integer()->get());
   }

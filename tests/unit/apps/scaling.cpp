@@ -50,6 +50,21 @@ TEST(Scaling, StrongEfficiencyIsIterationsTimesTimeOfAnIteration) {
   EXPECT_EQ(bound_of(rows[1]), "more iterations (0.80)");
 }
 
+TEST(Scaling, TimesThatNoMachineHasAreDoubted) {
+  std::vector<ScalingRow> rows{row(ScalingKind::strong, 1, 8, 100), row(ScalingKind::strong, 4, 2.5, 125),
+                               row(ScalingKind::strong, 1, 9, 100)};
+  rows[2].source = ScalingSource::replay;
+  relate(rows);
+  EXPECT_TRUE(doubts_about(rows).empty());
+  rows[1].seconds = 1;
+  rows[2].seconds = 80;
+  relate(rows);
+  const std::vector<std::string> doubts = doubts_about(rows);
+  ASSERT_EQ(doubts.size(), 2U);
+  EXPECT_EQ(doubts[0].find("efficiency 2 of strong scaling on 4 cores"), 0U) << doubts[0];
+  EXPECT_EQ(doubts[1].find("a step on one core is predicted to take 80 s and takes 8 s"), 0U) << doubts[1];
+}
+
 TEST(Scaling, WeakEfficiencyComparesTimesPerGrain) {
   // Four times the grains in 2.5 instead of 2 s; a thousandth more than four times must not count as loss.
   std::vector<ScalingRow> rows{row(ScalingKind::weak, 1, 2, 100), row(ScalingKind::weak, 4, 2.5, 100, 4004)};

@@ -38,6 +38,14 @@ TEST_F(Command, WithoutWhatItNeedsSaysSoAndReturnsTwo) {
     EXPECT_TRUE(says(outcome, "--help")) << arguments << ": " << outcome.messages;
     EXPECT_LT(outcome.messages.size(), 240U) << outcome.messages;
   }
+  // A variable of a script that is not set.
+  for (const std::string arguments : {"run scene.toml --out ''", "status ''", "solve p.hdf5 --csv ''",
+                                      "replay t.h5 --out ''", "plan ''", "run scene.toml --set ''"}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_TRUE(says(outcome, "the value is empty")) << arguments << ": " << outcome.messages;
+  }
+  EXPECT_TRUE(says(run("run scene.toml --steps 1e3"), "--steps = 1e3 is no number of the kind")) << "whole";
   EXPECT_TRUE(says(run("rnu scene.toml"), "'rnu' is no command of talus; did you mean 'run'?"));
   EXPECT_TRUE(says(run("study eror scene.toml"), "`talus study --help`"));
   EXPECT_TRUE(says(run("study error scene.toml --bad"), "`talus study error --help`"));

@@ -54,6 +54,9 @@ TEST_F(Warnings, OfWhatIsToHappenWhenTheRunHasEnded) {
   EXPECT_NE(of(column_scene + "[[remove]]\nname = \"r\"\nat = [1]\nstage = \"rest\"\n" + region)
                 .find("remove 'r': at = 1 s is never reached: its stage ends by 0.004 s"),
             std::string::npos);
+  EXPECT_NE(of(column_scene + "[[remove]]\nname = \"r\"\nfrom = 900\n" + region)
+                .find("remove 'r': from = 900 s" + end),
+            std::string::npos);
   EXPECT_EQ(of(column_scene + "[[remove]]\nat = [1e-3]\n" + region + "[[probe]]\nevery = 1e-3\n" + region),
             "");
 }

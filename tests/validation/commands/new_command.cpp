@@ -40,6 +40,10 @@ TEST(NewCommand, ReplacesNothingUnaskedAndRefusesWhatNoSceneCanBe) {
       << unknown.messages;
   EXPECT_EQ(run(scratch.path(), "new 'a b' --kind silo").code, 2)
       << "a name with a space is that of no scene";
+  EXPECT_NE(run(scratch.path(), "new " + std::string(300, 'x') + " --kind silo").messages.find("at most 100"),
+            std::string::npos);
+  EXPECT_NE(run(scratch.path(), "new heap.toml --kind heap").messages.find("leave .toml out"),
+            std::string::npos);
   EXPECT_FALSE(fs::exists(scratch / "other.toml") || fs::exists(scratch / "a b.toml"));
 }
 

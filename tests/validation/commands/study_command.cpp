@@ -410,6 +410,23 @@ TEST_F(StudyError, PlanMeasuresWhatOmissionsSave) {
   row >> percent >> with_bytes >> without_bytes;
   EXPECT_GT(with_ns, 0);
   EXPECT_GT(with_bytes, without_bytes) << measured.output;
+  const Outcome rolling =
+      run("plan scene.toml --threads 1 --measure --set stage.press.friction=0.35 "
+          "--set stage.press.rolling_resistance=0.1");
+  EXPECT_EQ(rolling.code, 0) << "without friction nothing rolls either: " << rolling.messages;
+}
+
+TEST_F(StudyError, PlanSaysWhereThereIsNothingToMeasure) {
+  ASSERT_EQ(run("new pour --kind silo").code, 0);
+  const Outcome planned = run("plan pour.toml --threads 1 --set orientation=true"),
+                measured = run("plan pour.toml --threads 1 --measure");
+  EXPECT_EQ(planned.code, 0) << planned.messages;
+  EXPECT_NE(planned.output.find("no grains yet"), std::string::npos) << planned.output;
+  EXPECT_NE(planned.output.find("asked for: 32 bytes per grain"), std::string::npos) << planned.output;
+  EXPECT_EQ(measured.code, 2);
+  EXPECT_NE(measured.messages.find("pour.toml: --measure: nothing is swept in the first step"),
+            std::string::npos)
+      << measured.messages;
 }
 
 }  // namespace

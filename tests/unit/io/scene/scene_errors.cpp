@@ -226,6 +226,10 @@ TEST(Overrides, MistakesNameTheOverride) {
   expect_named("slover.tolerance=1", "did you mean 'solver'?");
   expect_named("material.friction=-1", "must be 0 to");
   expect_named("material.friction=rough", "got the text 'rough'");
+  expect_named("seed=99999999999999999999",
+               "got 99999999999999999999, which is out of the range of integers");
+  expect_named("seed=-1e999", "got -1e999, which is out of the range of integers");
+  expect_named("seed=\"3\"", "got the text '3'");
   expect_named("time_step=.001", "got the text '.001': write 0.001");
   expect_named("time_step=1.", "got the text '1.': write 1.0");
   expect_named("gravity=\"1\"", "got the text '1'");
