@@ -217,7 +217,7 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
          "edges away from the cell");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.005, 0.1]"), "sample", "two of them have to fit");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]"), "sample.region", "nothing repeats along z");
-  refuse(replaced(cube, "count = 100", "count = 4000"), "sample[0].count", "no room for a grain");
+  refuse(replaced(cube, "count = 100", "count = 4000"), "sample.count", "no room for a grain");
   refuse(replaced(cube, "lengths", "shears = [0.01, 0, 0]\nlength"), "cell.length",
          "did you mean 'lengths'?");
 }
